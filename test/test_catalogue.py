@@ -8,7 +8,7 @@ from pathlib import Path
 
 from linkage_ros import mechanisms
 from linkage_ros.mechanisms.four_bar import grashof
-from linkage_ros.scene.legs import Assembly
+from linkage_ros.scene.legs import LegGroup
 import numpy as np
 import pytest
 
@@ -130,7 +130,7 @@ def _from_line(points, line):
       for away in (1e-9, -1e-6, 1e-3))])
 def test_a_drawn_curve_has_no_visible_corners(kind, lengths):
     linkage = mechanisms.create(kind, **lengths)
-    assembly = Assembly(linkage, scale=0.01)
+    assembly = LegGroup(linkage, scale=0.01)
     low, high = max(assembly.reach, key=lambda arc: arc[1] - arc[0])
     drawn = assembly.locus(linkage.tracer) @ (1, 1j)
     true = linkage.solve(np.linspace(low, high, 801), (linkage.tracer,))[linkage.tracer] @ (1, 1j)

@@ -9,7 +9,7 @@ import tracemalloc
 from effort import few_calls
 from linkage_ros import mechanisms
 from linkage_ros.robot_model import urdf
-from linkage_ros.scene.legs import Assembly
+from linkage_ros.scene.legs import LegGroup
 import numpy as np
 import pytest
 from robots import Pinocchio
@@ -144,7 +144,7 @@ def test_the_corner_of_a_flat_triangle_is_on_the_line(base, sides):
 def test_angles_have_the_same_bits_with_rates_that_are_infinite():
     cell = mechanisms.create('peaucellier')
     end = cell.reach()[0][0]
-    angles, both = (Assembly(cell).solution((), cell.joints[1:], rates)
+    angles, both = (LegGroup(cell).solution((), cell.joints[1:], rates)
                     for rates in (None, cell.joints[1:]))
     infinite = 0
     for theta in end - np.spacing(1.0) * np.arange(20):

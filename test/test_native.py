@@ -13,7 +13,7 @@ import warnings
 
 from linkage_ros import mechanisms
 from linkage_ros.formula import elementary, expression, program
-from linkage_ros.scene.legs import Assembly
+from linkage_ros.scene.legs import LegGroup
 import numpy as np
 import pytest
 from test_operations import by_lanes, off
@@ -62,7 +62,7 @@ def wait_for_compilers():
 def test_nobody_waits_for_the_compiler(code):
     linkage = fresh('Waited')
     code.allowed.clear()
-    solution = Assembly(linkage, 2).solution(('Waited',))
+    solution = LegGroup(linkage, 2).solution(('Waited',))
     solution.solve([0.3])
     expected = solution.rows.copy()
     assert expected[0] == pytest.approx(linkage.solve(0.3)['Waited']) and not code.made
@@ -79,7 +79,7 @@ def test_what_cannot_be_compiled_is_done_in_plain_python(monkeypatch):
 
     monkeypatch.setattr(native, 'Loop', refuse)
     linkage = fresh('Refused')
-    solution = Assembly(linkage, 2).solution(('Refused',))
+    solution = LegGroup(linkage, 2).solution(('Refused',))
     wait_for_compilers()
     with pytest.warns(UserWarning, match='no machine code.*no such processor'):
         solution.solve([0.2])
@@ -103,8 +103,8 @@ def test_a_single_leg_is_solved_without_llvmlite_in_memory(legs):
     done = subprocess.run([sys.executable, '-c', f"""
 import sys, threading
 from linkage_ros import mechanisms
-from linkage_ros.scene.legs import Assembly
-Assembly(mechanisms.create('jansen'), {legs}).solution(('G',), ('BC',)).solve([0.3])
+from linkage_ros.scene.legs import LegGroup
+LegGroup(mechanisms.create('jansen'), {legs}).solution(('G',), ('BC',)).solve([0.3])
 for thread in threading.enumerate():
     if thread is not threading.main_thread():
         thread.join()
@@ -114,7 +114,7 @@ print('llvmlite' in sys.modules)"""], capture_output=True, text=True, check=True
 
 def test_it_is_compiled_once_for_all_mechanisms_of_a_type(code):
     for _ in range(3):
-        solution = Assembly(fresh('Shared'), 2).solution(('Shared',))
+        solution = LegGroup(fresh('Shared'), 2).solution(('Shared',))
         wait_for_compilers()
         solution.solve([0.3])
     assert (code.made, code.ran) == (1, 3)

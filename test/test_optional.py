@@ -10,7 +10,7 @@ import signal
 import sys
 
 from linkage_ros import mechanisms, optional
-from linkage_ros.scene.legs import Assembly
+from linkage_ros.scene.legs import LegGroup
 import numpy as np
 import pytest
 from scenes import ROOT
@@ -98,7 +98,7 @@ def test_the_library_computes_without_machine_code(broken, way):
     with pytest.raises(ImportError, match='llvmlite is .*: pip install') as caught:
         leg.accelerated()
     assert isinstance(caught.value, ModuleNotFoundError) == (way == 'missing')
-    solution = Assembly(leg, 2).solution(('G',))
+    solution = LegGroup(leg, 2).solution(('G',))
     solution.solve([0.3])
     np.testing.assert_allclose(solution.rows[0], leg.solve(0.3)['G'], rtol=1e-12)
 

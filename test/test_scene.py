@@ -12,7 +12,7 @@ from linkage_ros import mechanisms, scene
 from linkage_ros.robot_model import urdf
 from linkage_ros.scene import slider, writing
 from linkage_ros.scene.joint_names import quoted_name
-from linkage_ros.scene.legs import Assembly
+from linkage_ros.scene.legs import LegGroup
 from linkage_ros.scene.motion import Motion
 import numpy as np
 import pytest
@@ -417,7 +417,7 @@ def test_a_change_of_sweep_goes_on_the_same_way():
 
 
 def test_an_end_of_the_reach_is_within_it_any_turn_and_nothing_beyond_is():
-    legs = Assembly(mechanisms.create('jansen', m=30.0), 3, True)
+    legs = LegGroup(mechanisms.create('jansen', m=30.0), 3, True)
     assert legs.is_limited
     # What wrapping rounds is some 1e-15 rad; what a leg is asked for is not.
     for turn in (-math.tau, 0.0, math.tau):

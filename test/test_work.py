@@ -9,7 +9,7 @@ import dis
 from linkage_ros import mechanisms
 from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.nodes.publishers import LATCHED
-from linkage_ros.scene.legs import Assembly
+from linkage_ros.scene.legs import LegGroup
 import pytest
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
@@ -22,7 +22,7 @@ WALKER = {'mechanisms': ['walker'], 'walker.type': 'jansen', 'walker.leg_pairs':
 def work(monkeypatch):
     """Count solutions by mechanism and by how many points, joints and rates were wanted."""
     done = Counter()
-    make = Assembly.solution
+    make = LegGroup.solution
 
     def counted(assembly, *wanted):
         solution = make(assembly, *wanted)
@@ -35,7 +35,7 @@ def work(monkeypatch):
         solution.solve = run
         return solution
 
-    monkeypatch.setattr(Assembly, 'solution', counted)
+    monkeypatch.setattr(LegGroup, 'solution', counted)
     return done
 
 

@@ -21,7 +21,7 @@ from .. import scene
 from ..cache import Cache
 from ..linkage import LinkPoint
 from ..robot_model import bodies, shapes, urdf
-from ..scene.legs import Solution
+from ..scene.legs import LegSolution
 
 # Cached messages of a mechanism, and of a scene: legs of walkers may leave their reach one by one,
 # each with another message.
@@ -35,7 +35,7 @@ class AssemblyState(NamedTuple):
     A solution of which all are valid is regular: all legs are assembled, all numbers finite.
     """
 
-    solution: Solution
+    solution: LegSolution
     # A byte for each leg, 1 if it is assembled; None if all legs are.
     assembled: bytes | None
     # Whether there are velocities, and efforts, and all of them are finite.

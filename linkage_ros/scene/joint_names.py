@@ -12,7 +12,7 @@ from typing import Any, Mapping, NamedTuple
 
 import numpy as np
 
-from .legs import Assembly
+from .legs import LegGroup
 from .parameters import read_lines, SceneError
 from ..cache import cached
 from ..linkage import Mechanism
@@ -63,7 +63,7 @@ def read_joint_names(mechanism: str, linkage: Mechanism, leg_pairs: int, mirrore
     unpublished. An angle wraps if it has an offset, unless it is an input. Raises SceneError if a
     line is malformed, or its joint is unknown or has another line.
     """
-    assembly = Assembly(linkage, leg_pairs, mirrored, reach=())
+    assembly = LegGroup(linkage, leg_pairs, mirrored, reach=())
     is_angle = {input_.name: False for input_ in linkage.inputs}
     is_angle |= {leg + joint: linkage.is_angle(joint)
                  for leg in assembly.legs for joint in assembly.joints}

@@ -22,7 +22,7 @@ from ..linkage import Leg, LinkPoint, Mechanism, sampled
 LOCUS_SAMPLES = 721
 
 
-class Solution:
+class LegSolution:
     """
     A solver of all legs, and the numbers of its last solution: `values`, or `parts` of them.
 
@@ -81,7 +81,7 @@ class Solution:
         return math.isfinite(sum(numbers))
 
 
-class Assembly:
+class LegGroup:
     """
     The legs of one mechanism.
 
@@ -107,7 +107,7 @@ class Assembly:
         self._scale = scale
 
     def solution(self, points: Sequence[str | LinkPoint] = (), joints: Sequence[str] = (),
-                 rates: Sequence[str] | None = None, efforts: int = 0) -> Solution:
+                 rates: Sequence[str] | None = None, efforts: int = 0) -> LegSolution:
         """
         Return a solver of all legs for points, joint angles and rates.
 
@@ -116,7 +116,7 @@ class Assembly:
         inputs, speeds = len(self.linkage.inputs), 0 if rates is None else len(self.linkage.inputs)
         rates = tuple(rates or ())
         sizes = len(self.linkage.axes) * len(points), len(joints), len(rates)
-        return Solution([*self.legs.values()], self.linkage.legs(
+        return LegSolution([*self.legs.values()], self.linkage.legs(
             tuple(points), tuple(joints), rates), inputs, sizes, speeds, efforts)
 
     def within_reach(self, value: float) -> list[bool]:

@@ -14,7 +14,7 @@ from typing import Any, Mapping, Sequence
 
 from .input_settings import InputSettings, read_settings
 from .joint_names import JointName, read_joint_names
-from .legs import Assembly
+from .legs import LegGroup
 from .loads import Load, read_loads
 from .parameters import Field, INVERSE, KINEMATICS, Parameter, SceneError, Values
 from .. import mechanisms
@@ -215,9 +215,9 @@ class SceneMechanism:
             self.scale * part for part in load) for name, load in self.loads.items()}
         return tuple(divided(self.linkage.effort(self.theta(values), loads).tolist(), self.scales))
 
-    def assembly(self) -> Assembly:
+    def assembly(self) -> LegGroup:
         """Return the solver of all legs."""
-        return Assembly(self.linkage, self.leg_pairs, self.mirrored, self.scale, self.reach)
+        return LegGroup(self.linkage, self.leg_pairs, self.mirrored, self.scale, self.reach)
 
     @property
     def tracer(self) -> str:

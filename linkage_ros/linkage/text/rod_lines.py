@@ -145,7 +145,7 @@ def parse(texts: Iterable[str]) -> list[Line]:
     if len(lines) > MOST_LINES:
         raise ValueError(f'a linkage in space has up to {MOST_LINES} lines, got {len(lines)}')
     check_order(lines, 'link', (GROUND,), _RODS)
-    _Assembly(lines).order()
+    _LinkTree(lines).order()
     return lines
 
 
@@ -174,9 +174,9 @@ def turning_rods(lines: list[Line], inputs: Collection[str]) -> list[str]:
 
     A rod that places two hinges with another one, for the motors, keeps its crank's drawn side.
     """
-    paired = {rod.names[0] for rods, _ in _Assembly(lines).order() if len(rods) == 2
+    paired = {rod.names[0] for rods, _ in _LinkTree(lines).order() if len(rods) == 2
               for rod in rods}
-    return [rods[0].names[0] for rods, links in _Assembly(lines, inputs).order()
+    return [rods[0].names[0] for rods, links in _LinkTree(lines, inputs).order()
             if len(rods) == 1 and links and rods[0].names[0] not in paired]
 
 
@@ -184,7 +184,7 @@ def turning_rods(lines: list[Line], inputs: Collection[str]) -> list[str]:
 Group = tuple[tuple[Line, ...], tuple[str, ...]]
 
 
-class _Assembly:
+class _LinkTree:
     """The tree of links, and the order in which rods place the joints that are not inputs."""
 
     def __init__(self, lines: list[Line], inputs: Collection[str] = ()):
@@ -290,11 +290,11 @@ class _Drawing:
     def __init__(self, builder: Builder, lines: list[Line], symbols: Mapping[str, Real],
                  signs: Mapping[str, int], inputs: Collection[str]):
         self._builder, self._signs = builder, signs
-        self._assembly = _Assembly(lines, inputs)
+        self._tree = _LinkTree(lines, inputs)
         self._numbers = {line.names[0]: [formula(arg.text).expression(symbols) for arg in
                                          line.arguments if arg.kind != 'LINK'] for line in lines}
-        self._joints = {name: _Joint(self._assembly.lines[name], self._numbers[name])
-                        for name in self._assembly.parents}
+        self._joints = {name: _Joint(self._tree.lines[name], self._numbers[name])
+                        for name in self._tree.parents}
         self._lengths: dict[str, Real] = {}
         self._magnitude = sum((abs(part) for name, numbers in self._numbers.items() for part in
                                numbers[:3 if name in self._joints else 6]), real(0.0))
@@ -303,12 +303,12 @@ class _Drawing:
         """Fill the builder."""
         for joint in self._joints.values():
             self._check_joint(joint)
-        for name, line in self._assembly.lines.items():
+        for name, line in self._tree.lines.items():
             if line.word == 'rod':
                 self._lengths[name] = [*self._numbers[name][6:], self._apart(line)][0]
-        for name in self._assembly.inputs:
+        for name in self._tree.inputs:
             self._drive(name)
-        for rods, links in self._assembly.order():
+        for rods, links in self._tree.order():
             if len(links) == 2:
                 self._place_hinges(rods, *(self._joints[link] for link in links))
             elif links:
@@ -316,7 +316,7 @@ class _Drawing:
             else:
                 (name,) = rods[0].names
                 self._lengths[name] = self._within(name, self._apart(rods[0]))
-        for name, line in self._assembly.lines.items():
+        for name, line in self._tree.lines.items():
             (self._add_rod if line.word in _RODS else self._add_joint)(name, line)
 
     def _check_joint(self, joint: _Joint) -> None:
@@ -334,7 +334,7 @@ class _Drawing:
 
     def _drive(self, name: str) -> None:
         """Make an angle or a length an input."""
-        self._builder.drawn = self._assembly.lines[name]
+        self._builder.drawn = self._tree.lines[name]
         joint, ends = self._joints.get(name), self._numbers[name][6:]
         turns, longest = joint and joint.line.word != 'slide', 2.0 * self._magnitude
         value = self._within(name, self._builder.drive(Input(name, ANGLE) if turns else Input(
@@ -358,7 +358,7 @@ class _Drawing:
 
     def _on_link(self, end: _End, link: str) -> Vector:
         """Return a point of one link in the coordinates of another."""
-        up, down = self._assembly.chain(end.link), self._assembly.chain(link)
+        up, down = self._tree.chain(end.link), self._tree.chain(link)
         point = end.point
         for name in up:
             if name not in down:
@@ -374,17 +374,17 @@ class _Drawing:
         joint = self._joints[moving[0]] if len(moving) == 1 else None
         if joint is None or joint.turn is None:
             return Pivot(Circle(self._on_link(end, link), ZERO, ZERO))
-        carries = moving[0] in self._assembly.chain(end.link)
+        carries = moving[0] in self._tree.chain(end.link)
         return Pivot(joint.hinge.circle(end.point), joint.turn if carries else joint.turn.back())
 
     def _moving(self, link: str, other: str) -> list[str]:
-        return [name for name in self._assembly.between(link, other)
+        return [name for name in self._tree.between(link, other)
                 if self._joints[name].line.word != 'fixed']
 
     def _beyond(self, line: Line, link: str) -> tuple[_End, _End]:
         """Return the end of a rod that a link carries, and the other."""
         first, second = self._ends(line)
-        return (first, second) if link in self._assembly.chain(first.link) else (second, first)
+        return (first, second) if link in self._tree.chain(first.link) else (second, first)
 
     def _place_joint(self, line: Line, joint: _Joint) -> None:
         """Turn or slide a joint so that a rod fits."""
@@ -414,7 +414,7 @@ class _Drawing:
 
     def _add_limits(self, name: str, value: Any) -> list[Limit]:
         """Add the limits of a joint or a cylinder to the linkage, and return them."""
-        word, ends = self._assembly.lines[name].word, self._numbers[name][6:]
+        word, ends = self._tree.lines[name].word, self._numbers[name][6:]
         slack = real(EDGE) if word == 'hinge' else TOLERANCE * self._magnitude
         margins = [value - ends[0], ends[1] - value] if ends else [value] * (word == 'cylinder')
         found = [Limit(margin, slack) for margin in margins]
@@ -489,11 +489,11 @@ class _Drawing:
             builder.cylinders.append((places[0], places[1]))
 
     def _add_value(self, name: str, kind: str, place: str, value: Any) -> None:
-        parent = self._assembly.lines[name].depends_on[0]
+        parent = self._tree.lines[name].depends_on[0]
         self._builder.links.append(Link(name, parent, place, kind, real(0.0), place))
         self._builder.joint_values[name] = value
 
     def _point(self, name: str, end: _End) -> None:
         if name in self._builder.points:
-            raise self._assembly.lines[end.link].error(f'the name {name} is used by another point')
+            raise self._tree.lines[end.link].error(f'the name {name} is used by another point')
         self._builder.points[name] = Point(self._on_link(end, GROUND), end.link, self._magnitude)
