@@ -71,7 +71,8 @@ def run(name: str, work: Callable, args: Sequence[str] | None) -> int:
     except (RequestError, SceneError, ImportError) as error:
         why = error
     except OSError as error:
-        why = f'{error.filename}: {error.strerror}{_beside(error)}' if error.filename else error
+        why = error if not error.filename else (
+            f'{error.filename}: {error.strerror}{_similar_file(error)}')
     except KeyboardInterrupt:
         why = 'interrupted'
     try:
@@ -84,7 +85,7 @@ def run(name: str, work: Callable, args: Sequence[str] | None) -> int:
     return 1 if why else 0
 
 
-def _beside(error: OSError) -> str:
+def _similar_file(error: OSError) -> str:
     """Return the end of a sentence that suggests the file that is nearly a missing one."""
     folder, name = os.path.split(str(error.filename))
     if not isinstance(error, FileNotFoundError) or not os.path.isdir(folder or '.'):

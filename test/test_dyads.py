@@ -52,7 +52,7 @@ def carriage(axis, bodies):
 def test_a_slide_is_the_same_in_whichever_direction_it_is_given(drawn, value, bodies):
     forward, backward = drawn(1.0 + 0.0j, bodies), drawn(-1.0 + 0.0j, bodies)
     for dyads in (forward, backward):
-        dyads.take_apart()
+        dyads.decompose()
         assert not dyads.left
     assert forward.lines == backward.lines and forward.parts == backward.parts
     linkage = mechanisms.create('custom', joints=forward.lines)

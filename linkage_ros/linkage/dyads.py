@@ -127,7 +127,7 @@ class Dyads:
         self.placed_on: dict[str, str] = {}
         self.pins, self.slides, self.motors = list(pins), list(slides), list(motors)
 
-    def take_apart(self) -> None:
+    def decompose(self) -> None:
         """Place every body that can be placed."""
         self.place(self.ground, Part('', '', 1.0 + 0.0j))
         while any(rule() for rule in self.rules()):
@@ -271,7 +271,7 @@ class Dyads:
                 self.fixed(body, pin[body])
         return True
 
-    def hang(self, body: str, joint: str, tip: str, link: str = '') -> bool:
+    def place_on_joint(self, body: str, joint: str, tip: str, link: str = '') -> bool:
         """Record a placed body that turns about a joint."""
         on = self.on[body]
         return self.place(body, Part(link or bar_name(joint, tip), joint, on[tip] - on[joint]))
@@ -303,7 +303,7 @@ class Dyads:
         name = self.name(place, body, f'crank {centre} {self.length_text(abs(place - centred))}'
                          f'{zero}{geared}')
         self.on[body].setdefault(centre, centred)
-        return self.hang(body, centre, name, f'crank{number}')
+        return self.place_on_joint(body, centre, name, f'crank{number}')
 
     def _carriage(self, slide: Slide, way: int) -> bool:
         """Place the body that a motor moves along a placed one."""
@@ -346,7 +346,7 @@ class Dyads:
             axis = sign * slide.axes[1 - way]
             return self.place(barrel, Part(f'barrel{number}', base, sign * slide.axes[way])) \
                 and self.place(rod, Part(f'cylinder{number}', name, axis, slide.joint, start)) \
-                and self.hang(bar, pivot, name)
+                and self.place_on_joint(bar, pivot, name)
         return False
 
     def _dyad(self, first: str) -> bool:
@@ -362,7 +362,8 @@ class Dyads:
                 f'dyad {one[0]} {two[0]} {self.length_text(abs(pin[first] - one[1]))} '
                 f'{self.length_text(abs(pin[second] - two[1]))} {side}')
             name = self.name(pin[first], first, line)
-            return self.hang(first, one[0], name) and self.hang(second, two[0], name)
+            return self.place_on_joint(first, one[0], name) and self.place_on_joint(
+                second, two[0], name)
         return False
 
     def _slider(self, slide: Slide, way: int) -> bool:
@@ -378,7 +379,7 @@ class Dyads:
             name = self.name(pin[rod], rod, f'slider {joint} {self.length_text(length)} {start} '
                              f'along {towards} {half}')
             on_block = slide.axes[1 - way] * (along / axis)
-            return self.hang(rod, joint, name) and self.place(
+            return self.place_on_joint(rod, joint, name) and self.place(
                 block, Part(f'block{number}', name, on_block, slide.joint, on_base))
         return False
 
@@ -399,7 +400,7 @@ class Dyads:
         name = self.name(start + length * sign * axis, lever,
                          f'slot {pivot} {pin} {self.length_text(offset)} out '
                          f'{self.length_text(length)}')
-        return self.hang(lever, pivot, name, f'lever{number}') and self.place(
+        return self.place_on_joint(lever, pivot, name, f'lever{number}') and self.place(
             block, Part(f'slide{number}', pin, sign * across, slide.joint, start))
 
     def _yoke(self, slide: Slide, way: int) -> bool:

@@ -44,18 +44,18 @@ def groups(robot: Robot) -> list[Group]:
     """Return the loops of a robot, with their planar parts; bodies fixed to others are one."""
     # Whatever closes a loop joins bodies as all others do.
     fixed = [replace(joint, is_cut=False) for joint in robot.joints if joint.kind == FIXED]
-    home = {robot.root: robot.root}
+    link_of = {robot.root: robot.root}
     for body, (base, joint) in replace(robot, joints=fixed).spanning_tree()[0].items():
-        home[body] = home[base] if joint.kind == FIXED else body
+        link_of[body] = link_of[base] if joint.kind == FIXED else body
     # Several bodies that are one have the name of the first that a joint moves.
-    names = {home[body]: body for joint in robot.joints[::-1] if joint.kind != FIXED
+    names = {link_of[body]: body for joint in robot.joints[::-1] if joint.kind != FIXED
              for body in joint.bodies[::-1]}
-    home = {body: names.get(first, first) for body, first in home.items()}
-    joints = [replace(joint, bodies=(home[joint.bodies[0]], home[joint.bodies[1]]), is_cut=False)
-              for joint in robot.joints]
-    robot = replace(robot, root=home[robot.root], joints=[
+    link_of = {body: names.get(first, first) for body, first in link_of.items()}
+    joints = [replace(joint, bodies=(link_of[joint.bodies[0]], link_of[joint.bodies[1]]),
+                      is_cut=False) for joint in robot.joints]
+    robot = replace(robot, root=link_of[robot.root], joints=[
         joint for joint in joints if len({*joint.bodies}) == 2], frames={
-        body: robot.frames[body] for body in home.values()})
+        body: robot.frames[body] for body in link_of.values()})
     return [group._replace(parts=_parts(robot, group) if group.why else [group])
             for group in _groups(robot, _with_balls(robot))]
 
@@ -209,7 +209,7 @@ class Drawing(Dyads):
             [slides.get(joint) or Hinge(joint.bodies, joint.places, joint.axes[0],
                                         -joint.axes[0] * joint.start, joint)
              for joint in self.driven], size, near)
-        self.take_apart()
+        self.decompose()
 
     def _flatten(self, group: Group, drives: Sequence[str]) -> None:
         """Set the plane, and the joints in it."""

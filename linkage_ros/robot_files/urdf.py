@@ -56,7 +56,7 @@ def read(root: Element) -> Robot:
             ratio, start = numbers(f'{mimic.get("multiplier", 1)} {mimic.get("offset", 0)}', 2)
             robot.follow(name, mimic.get('joint', ''), ratio, start)
     if 'world' in links and 'world' not in robot.frames:
-        robot.hang('world', roots[0], [0.0] * 6)
+        robot.add_body('world', roots[0], [0.0] * 6)
     _close_by_elements(robot, root)
     _close_by_frames(robot)
     sdf.join(robot, root.findall('gazebo/joint'))

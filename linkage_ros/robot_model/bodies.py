@@ -143,10 +143,10 @@ class _Tree:
         ground = self._body('', GROUND)
         self.robot = Robot(base, {base: np.eye(4)}, pieces={ground: []},
                            stands={ground: mechanism.pose}, name=mechanism.name)
-        self.robot.hang(ground, base, 6 * (0.0,))
+        self.robot.add_body(ground, base, 6 * (0.0,))
         self._shared = mechanism.linkage.links[0] if len(legs) > 1 else None
         if self._shared:
-            self._hang('', 1.0, self._shared)
+            self._add_link('', 1.0, self._shared)
             self.robot.pieces[self._body('', self._shared.name)] = [self._ball]
         for prefix, leg in legs.items():
             self._add_leg(prefix, leg)
@@ -158,9 +158,9 @@ class _Tree:
             body, link = self._body(prefix, name), links.get(name)
             if link and link is self._shared:
                 # The pins of a leg are fixed to the crank of all legs.
-                robot.hang(body, self._body('', name), (0.0, 0.0, 0.0, 0.0, 0.0, -leg.lag))
+                robot.add_body(body, self._body('', name), (0.0, 0.0, 0.0, 0.0, 0.0, -leg.lag))
             elif link:
-                self._hang(prefix, leg.side, link)
+                self._add_link(prefix, leg.side, link)
             pieces = robot.pieces.setdefault(body, [])
             pieces += [piece for piece in self._pieces(leg.side, name) if piece not in pieces]
             if link and not pieces:
@@ -171,12 +171,12 @@ class _Tree:
                     met = f'{self._mechanism.name}_{prefix}{point}'
                     cut = f'_cut{ends[point] - 1 if ends[point] > 2 else ""}' * (ends[point] > 1)
                     place = *self._place(leg.side, name, place), 0.0, 0.0, 0.0, 0.0
-                    robot.hang(met + cut, body, place)
+                    robot.add_body(met + cut, body, place)
                     robot.pieces[met + cut] = [self._ball]
                     if cut:
                         robot.meets[met + cut] = met
 
-    def _hang(self, prefix: str, side: float, link: Link) -> None:
+    def _add_link(self, prefix: str, side: float, link: Link) -> None:
         """Add a body that moves on its parent; in a mirrored leg the other way round."""
         slides, zero = link.kind == 'prismatic', side * float(np.asarray(link.zero))
         if side < 0.0 and link.parent == GROUND:
@@ -185,7 +185,7 @@ class _Tree:
         called = self._mechanism.joints[prefix + link.name]
         travel = self._travels.get(link.name)
         limits = travel and called.travel((side * travel[0], side * travel[1]))
-        self.robot.hang(
+        self.robot.add_body(
             self._body(prefix, link.name), self._body(prefix, link.parent),
             (x, y, 0.0, 0.0, 0.0, zero), SLIDE if slides else HINGE,
             (called.sign * side, 0.0, 0.0) if slides else (0.0, 0.0, called.sign),
@@ -288,9 +288,9 @@ def _add_slots(mechanism: SceneMechanism, robot: Robot) -> None:
             name, point = (f'{mechanism.name}_{prefix}{end}' for end in (link, pin))
             slot, end = f'{name}_slot_link', f'{name}_pin'
             x, y, *_ = np.linalg.solve(robot.frames[f'{name}_link'], robot.frames[point])[:, 3]
-            robot.hang(slot, f'{name}_link', (x, y, 0.0, 0.0, 0.0, 0.5 * math.pi),
-                       SLIDE, (1.0, 0.0, 0.0), None, f'{name}_slot')
-            robot.hang(end, slot, 6 * (0.0,))
+            robot.add_body(slot, f'{name}_link', (x, y, 0.0, 0.0, 0.0, 0.5 * math.pi),
+                           SLIDE, (1.0, 0.0, 0.0), None, f'{name}_slot')
+            robot.add_body(end, slot, 6 * (0.0,))
             robot.pieces[slot] = robot.pieces[end] = robot.pieces[point]
             robot.meets[end] = point
 

@@ -195,10 +195,10 @@ class Robot:
     name: str = 'robot'
     density: float = 0.0
 
-    def hang(self, name: str, parent: str, place: Sequence[float], kind: str = FIXED,
-             axis: Sequence[float] = (0.0, 0.0, 1.0),
-             limits: tuple[float, float] | None = None, joint: str = '',
-             position: float = 0.0) -> None:
+    def add_body(self, name: str, parent: str, place: Sequence[float], kind: str = FIXED,
+                 axis: Sequence[float] = (0.0, 0.0, 1.0),
+                 limits: tuple[float, float] | None = None, joint: str = '',
+                 position: float = 0.0) -> None:
         """Add a body on another one, at x, y, z [m], roll, pitch, yaw [rad], and its joint."""
         self.frames[name] = self.frames[parent] @ pose(*place)
         self.join(joint or f'{name}_fixed', kind, (parent, name), self.frames[name], axis,
@@ -207,19 +207,19 @@ class Robot:
 
     def bodies(self) -> Iterator[Body]:
         """Yield the bodies except the root, parents first; joints are at origins."""
-        span = np.abs([frame[:3, 3] for frame in self.frames.values()]).max()
+        magnitude = np.abs([frame[:3, 3] for frame in self.frames.values()]).max()
         for name, (base, joint) in self.spanning_tree()[0].items():
             frame, seen = self.frames[name], self.frames[base]
             if joint.kind in (HINGE, SLIDE) and joint.position is not None:
-                home = at(joint.place(name), frame[:3, :3])
-                is_apart = np.abs(home - frame).max() > 1e-12 * span
-                axis = np.round(home[:3, :3].T @ joint.motion(name), 15) + 0.0
-                yield Body(f'{name}/joint' if is_apart else name, base, _seen(seen, home, span),
-                           joint, axis.tolist())
+                origin = at(joint.place(name), frame[:3, :3])
+                is_apart = np.abs(origin - frame).max() > 1e-12 * magnitude
+                axis = np.round(origin[:3, :3].T @ joint.motion(name), 15) + 0.0
+                yield Body(f'{name}/joint' if is_apart else name, base,
+                           _seen(seen, origin, magnitude), joint, axis.tolist())
                 if not is_apart:
                     continue
-                base, seen = f'{name}/joint', home
-            yield Body(name, base, self.stands.get(name) or _seen(seen, frame, span))
+                base, seen = f'{name}/joint', origin
+            yield Body(name, base, self.stands.get(name) or _seen(seen, frame, magnitude))
 
     def cut_loops(self) -> Robot:
         """
@@ -382,12 +382,12 @@ class Body(NamedTuple):
     axis: Sequence[float] = ()
 
 
-def _seen(base: np.ndarray, frame: np.ndarray, span: float) -> list[float]:
-    """Return the coordinates of a pose in another, without rounding of places up to `span` [m]."""
+def _seen(base: np.ndarray, frame: np.ndarray, magnitude: float) -> list[float]:
+    """Return the coordinates of a pose in another, without rounding of places so large [m]."""
     turned = base[:3, :3].T
     *place, roll, pitch, yaw = coordinates(at(turned @ (frame[:3, 3] - base[:3, 3]),
                                               turned @ frame[:3, :3]))
-    return [*(float(f'{x:.15g}') * (abs(x) > 4e-16 * span) for x in place),
+    return [*(float(f'{x:.15g}') * (abs(x) > 4e-16 * magnitude) for x in place),
             *(round(angle, 15) for angle in (roll, pitch, yaw))]
 
 

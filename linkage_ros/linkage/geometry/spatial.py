@@ -181,7 +181,7 @@ class Hinge(NamedTuple):
         return self.circle(point).at(turn.cosine, turn.sine)
 
 
-def rated_turn(y: Real, x: Real, cos: Real, sin: Real, rate: Rate) -> Turn:
+def turn_with_rate(y: Real, x: Real, cos: Real, sin: Real, rate: Rate) -> Turn:
     """Return the turn by the angle of (x, y), with its cosine, sine and rate."""
     of, formula = rate
     # The rates refer to the returned turn: a second derivative then uses them again.
@@ -224,7 +224,7 @@ def rod_on_hinge(hinge: Hinge, pivot: Pivot, end: Vector, length: Real, side: Re
         return ((p - rho * cos) * (dp - drho * cos) + (q - rho * sin) * (dq - drho * sin)
                 + d * dd - length * dlength) / (-0.5 * side * area)
 
-    turn = rated_turn(y, x, x / size, y / size, Rate((p, q, d, rho, length), rate))
+    turn = turn_with_rate(y, x, x / size, y / size, Rate((p, q, d, rho, length), rate))
     radial = p * turn.cosine + q * turn.sine - rho
     return turn, near, far, arctangent(
         0.5 * area / rho, square_root(square(radial) + square(d)))
@@ -325,15 +325,15 @@ def newton_step(rods: Sequence[tuple[Vector, Circle, Scalar]],
     return (*_stepped(*pose[:2], d1), *_stepped(*pose[2:], d2)), abs(d1) + abs(d2)
 
 
-def two_rods(rods: Sequence[Rod], home: Sequence[Real]) -> tuple[Turn, Turn, Limit]:
+def two_rods(rods: Sequence[Rod], start: Sequence[Real]) -> tuple[Turn, Turn, Limit]:
     """
-    Return the turns of two hinges in a row with which two rods fit, by steps from home [rad].
+    Return the turns of two hinges in a row with which two rods fit, by steps from start [rad].
 
     In the frame of the first hinge the end of a rod is B = Rz(first angle) Q(second angle), with Q
     on a circle. The limit is below zero where no pose is found.
     """
     bars = [(rod.pivot.place, rod.end, rod.length) for rod in rods]
-    pose: HingeAngles = cosine(home[0]), sine(home[0]), cosine(home[1]), sine(home[1])
+    pose: HingeAngles = cosine(start[0]), sine(start[0]), cosine(start[1]), sine(start[1])
     for _ in range(STEPS):
         pose, step = newton_step(bars, pose)
     final: list[Row] = []
@@ -347,7 +347,7 @@ def two_rods(rods: Sequence[Rod], home: Sequence[Real]) -> tuple[Turn, Turn, Lim
             in zip(final, bars, (given[:3], given[4:7]), (given[3], given[7]))])
 
     of = tuple(x for pivot, _, length in bars for x in (*pivot, length))
-    first, second = (rated_turn(s, c, c, s, Rate(
+    first, second = (turn_with_rate(s, c, c, s, Rate(
         of, lambda *given, which=which: rates(*given)[which]))
         for which, (c, s) in enumerate((pose[:2], pose[2:])))
     return first, second, Limit(with_rate(LAST_STEP - step, formula=lambda: real(0.0)), real(0.0))

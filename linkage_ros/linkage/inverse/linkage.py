@@ -198,7 +198,7 @@ class _Sketch(Dyads):
         # A joint on a single body is placed only if an input is read from it.
         self.pins = [pin for pin in self._named.values() if len(pin) > 1]
         self.on = {body: {} for body in self._at}
-        self.take_apart()
+        self.decompose()
         self.reads = [self._read(by, input_) for by, input_ in enumerate(linkage.inputs)]
 
     def _motion(self, link: Link) -> Motor:

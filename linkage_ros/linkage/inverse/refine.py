@@ -24,7 +24,7 @@ from ..tolerances import ONE, SINGULAR
 
 # Beside a candidate without a pose or rates these are looked for so many times, each time twice as
 # far as before, from an ulp on: where the margin is 1e-6, rounding of the outputs leads as far.
-BESIDE = 22
+MAX_PERTURBATIONS = 22
 
 
 def refine(problem: InverseProblem, values: Sequence[float], candidate: Candidate,
@@ -37,13 +37,13 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Candidat
     n, at, (inputs, low, high) = problem.n, problem.newton.at, candidate
     is_certain = low > -math.inf
     best = at(*inputs, *values)
-    beside = inputs, best
+    perturbed = inputs, best
     if not _is_known(best, n):
-        beside = next(((x, pose) for x in _beside(inputs)
-                       if _is_known(pose := at(*x, *values), n)), beside)
+        perturbed = next(((x, pose) for x in _perturbed(inputs)
+                          if _is_known(pose := at(*x, *values), n)), perturbed)
     if not best[0] < math.inf:
         # Rounding of the outputs may have led out of the reach.
-        inputs, best = beside
+        inputs, best = perturbed
     following = best[2 + n:2 + 2 * n]
     for _ in range(HALVINGS):
         if is_certain and not low <= following[0] <= high:
@@ -62,7 +62,7 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Candidat
     if not (best[0] <= SINGULAR if is_certain else best[1] <= ACCEPTED):
         return None
     # At an end of a segment, rates are those of the nearest float that has them.
-    rates = (best if _is_known(best, n) else beside[1])[2 + 3 * n:]
+    rates = (best if _is_known(best, n) else perturbed[1])[2 + 3 * n:]
     return *best[2 + 2 * n:2 + 3 * n], *rates
 
 
@@ -71,10 +71,10 @@ def _is_known(step: Row, n: int) -> bool:
     return math.isfinite(sum(step[2 + 3 * n:], step[0]))
 
 
-def _beside(inputs: Row) -> Iterator[Row]:
+def _perturbed(inputs: Row) -> Iterator[Row]:
     """Yield other inputs, each time farther away."""
     return ((*inputs[:by], inputs[by] + side * 2.0 ** k * math.ulp(inputs[by]), *inputs[by + 1:])
-            for k in range(BESIDE) for side in (1.0, -1.0) for by in range(len(inputs)))
+            for k in range(MAX_PERTURBATIONS) for side in (1.0, -1.0) for by in range(len(inputs)))
 
 
 def _are_one(problem: InverseProblem, solution: Row, other: Row) -> bool:
