@@ -14,7 +14,7 @@ from typing import Any, Iterable, Iterator, NamedTuple, Sequence
 
 import numpy as np
 
-from .tolerances import LEAST, ONE, ROUNDING
+from .tolerances import MIN_ANGLE, ONE, ROUNDING
 
 Arc = tuple[float, float]
 
@@ -157,7 +157,7 @@ class Input(NamedTuple):
     def distinct(self, values: Iterable[float]) -> list[float]:
         """Return values in order, wrapped, one of those that differ by rounding."""
         found: list[float] = []
-        for x in sorted(float(self.wrapped(0.0 if abs(x) < LEAST else x)) for x in values):
+        for x in sorted(float(self.wrapped(0.0 if abs(x) < MIN_ANGLE else x)) for x in values):
             if not found or x - found[-1] > ONE:
                 found.append(x)
         if self.wraps and len(found) > 1 and found[0] + self.turn - found[-1] <= ONE:

@@ -8,7 +8,7 @@ All are without a unit: parts of a size, or angles [rad]; inputs and outputs cou
 """
 
 # Angles below this [rad] are zero: the rounding of any other angle is coarser.
-LEAST = 1e-18
+MIN_ANGLE = 1e-18
 # A margin or a sum counts as zero within rounding: eight half ulps of the scale.
 TOLERANCE = 8 * 2.0 ** -53
 # Inputs, or values of an output, no farther apart than this are one: the rounding of many sums.

@@ -21,7 +21,7 @@ from ..formulas import LinkageFormulas
 from ..inputs import Input
 from ..kinematics import Kinematics
 from ..motion.reach import reach_of
-from ..tolerances import LEAST, SINGULAR
+from ..tolerances import MIN_ANGLE, SINGULAR
 from ...cache import cached
 from ...formula.expression import argument, dimension, greater, nearest_integer, Real, real, where
 from ...formula.program import CompiledFunction, Program
@@ -30,7 +30,7 @@ from ...formula.program import CompiledFunction, Program
 ACCEPTED = 64.0 * 2.0 ** -53
 
 # The dimension of this name is the unit of lengths [m]; those of inputs' names are their units.
-LONGEST_BAR = '[longest bar]'
+UNIT_LENGTH = '[longest bar]'
 
 # The inputs of a solution, then the rates of all outputs by the first input, by the second etc.
 Row = tuple[float, ...]
@@ -95,7 +95,7 @@ class InverseProblem:
         """Return the code for a step of Newton's method; see `newton`."""
         linkage = self.linkage
         program = newton(linkage.structure, self.outputs, tuple(self.periods), tuple(self.turns))
-        return program.bind({**linkage.dimensions, LONGEST_BAR: linkage.longest, **{
+        return program.bind({**linkage.dimensions, UNIT_LENGTH: linkage.longest, **{
             f'[{input_.name}]': size for input_, size in zip(self.inputs, self.sizes)}}, {},
             linkage.is_accelerated)
 
@@ -145,7 +145,7 @@ def newton(structure: LinkageFormulas, outputs: tuple[str, ...], periods: Sequen
     n, inputs = len(outputs), [argument(by) for by in range(len(outputs))]
     # Of one input, candidates are inside the reach.
     rows = structure.checked(outputs) if n > 1 else structure.parts(((), outputs, outputs))
-    scales = [real(1.0) if structure.is_angle(name) else dimension(LONGEST_BAR)
+    scales = [real(1.0) if structure.is_angle(name) else dimension(UNIT_LENGTH)
               for name in outputs]
     sizes = [real(1.0) if input_.turns else dimension(f'[{input_.name}]')
              for input_ in structure.built.inputs]
@@ -166,7 +166,7 @@ def newton(structure: LinkageFormulas, outputs: tuple[str, ...], periods: Sequen
     steps = [_determinant([[*rates[:by], gap, *rates[by + 1:]]
                            for gap, rates in zip(gaps, jacobian)]) for by in range(n)]
     for x, size, turn in zip(inputs, sizes, turns):
-        x = nearest(where(abs(x) > LEAST * size, x, 0.0), real(0.0), turn)
+        x = nearest(where(abs(x) > MIN_ANGLE * size, x, 0.0), real(0.0), turn)
         wrapped.append(x if turn == math.inf else where(x < 0.5 * turn, x, -0.5 * turn))
     return Program([
         sum(map(abs, gaps), real(0.0)), reduce(greater, ratios), *gaps,

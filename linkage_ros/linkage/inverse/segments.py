@@ -22,7 +22,7 @@ from ..inputs import Arc, Input
 from ..kinematics import Kinematics
 from ..motion.curves import CUTS, refined, sampled, turning_points
 from ..motion.singularities import Analysis, NEAR
-from ..tolerances import CLOSE, LEAST, ONE, ROUNDING, SINGULAR, TOLERANCE
+from ..tolerances import CLOSE, MIN_ANGLE, ONE, ROUNDING, SINGULAR, TOLERANCE
 
 # Rounding of a pose, which that of all joints may explain: so many ulps of an input, or multiples
 # of the rounding of one sum.
@@ -265,7 +265,7 @@ class Segments:
             at, _ = refined(lambda x: (self._curve(x.ravel())[1] >= 0.0).reshape(
                 x.shape) == rising[:, None], theta[places], theta[places + 1])
         found = self._curve(at)[0] if len(at) else at
-        at[abs(at) < LEAST] = 0.0
+        at[abs(at) < MIN_ANGLE] = 0.0
         # An extreme may be the one input at which an arm has no length and no direction.
         found = value[places] + self._difference(
             np.where(np.isfinite(found), found, value[places]) - value[places])

@@ -15,7 +15,7 @@ from typing import Callable
 
 import numpy as np
 
-from ..tolerances import LEAST
+from ..tolerances import MIN_ANGLE
 
 # Even samples of a whole turn; halvings of a distance after which few of its digits are left.
 TURN_SAMPLES, HALVINGS = 360, 48
@@ -45,7 +45,7 @@ def refined(test: Callable, lo: np.ndarray, hi: np.ndarray) -> tuple[np.ndarray,
     """
     lo, hi = np.array(lo, float), np.array(hi, float)
     row = np.arange(len(lo))
-    while np.any((abs(hi - lo) > LEAST) & (hi != np.nextafter(lo, hi))):
+    while np.any((abs(hi - lo) > MIN_ANGLE) & (hi != np.nextafter(lo, hi))):
         theta = lo[:, None] + (hi - lo)[:, None] * CUTS
         same = test(theta)
         first = np.where(same.all(axis=1), len(CUTS), np.argmin(same, axis=1))
