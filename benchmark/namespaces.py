@@ -64,10 +64,10 @@ def by_jax(task, given):
 
 
 METHODS = (
-    Method('numpy', 'numpy', lambda task, given: lambda: task.linkage.posed(
+    Method('numpy', 'numpy', lambda task, given: lambda: task.linkage.compiled_pose(
         *task.requested).over(*given)),
     Method('`accelerated()`', 'llvmlite', lambda task, given: lambda: task.linkage.accelerated(
-        ).posed(*task.requested).over(*given)),
+        ).compiled_pose(*task.requested).over(*given)),
     Method('torch', 'torch', by_torch),
     Method('with gradients', 'torch', by_torch_backwards, 100_000),
     Method('JAX, `jit`', 'jax', by_jax))

@@ -14,7 +14,7 @@ from linkage_ros import mechanisms, scene
 from linkage_ros.cli import RequestError
 from linkage_ros.robot_files import cli, closing, readers
 from linkage_ros.robot_model.cli import main as robot_model
-from linkage_ros.robot_model.robot import posed
+from linkage_ros.robot_model.robot import with_positions
 import numpy as np
 import pytest
 from robots import (
@@ -228,7 +228,7 @@ def test_joints_that_no_mechanism_publishes_are_one_of_cranks_where_they_are(tmp
         <mimic joint="j" multiplier="-0.5" offset="0.1"/></joint>
       <joint name="l" type="revolute"><parent link="c"/><child link="d"/></joint>
       <joint name="rail" type="prismatic"><parent link="d"/><child link="e"/></joint></robot>""")))
-    given, lost = cli.others(posed(robot, {'rail': -15.0, 'j': 200.0}), {}, {
+    given, lost = cli.others(with_positions(robot, {'rail': -15.0, 'j': 200.0}), {}, {
         'l': 0.25, 'nobody': 1.0})
     assert not lost and given == {
         'mechanisms': ['others'], 'others.type': 'custom', 'others.only_named': True,
@@ -354,7 +354,7 @@ def test_no_answer_depends_on_the_starts_of_a_search(tmp_path, name, seeds):
     file, pose, question = OPEN[name]
     if file.startswith('<'):
         file = of_text(tmp_path / 'robot.urdf', file)
-    robot = posed(readers.read(str(ROBOTS / file)), pose)
+    robot = with_positions(readers.read(str(ROBOTS / file)), pose)
 
     def answer(seed):
         made = closing.closed(robot, seed)
@@ -376,8 +376,8 @@ def answer(robot, *lines):
     more = {'--driven': [], '--pose': [], '--hold': []}
     for option, *values in lines:
         more[option] += values
-    robot = posed(replace(robot, driven=more['--driven'] or robot.driven),
-                  cli.positions(more['--pose']))
+    robot = with_positions(replace(robot, driven=more['--driven'] or robot.driven),
+                           cli.positions(more['--pose']))
     try:
         return '', *cli.described(closing.held(robot, cli.positions(more['--hold'])))[1]
     except RequestError as error:
@@ -395,7 +395,8 @@ def undecided(seed):
         robot.driven = robot.driven[1:] + names[:not robot.driven[1:]]
     if kind == 1:
         robot.driven = [*dict.fromkeys([*robot.driven, *rng.permutation(names)[:1]])]
-    return posed(robot, {name: float(rng.uniform(-1.5, 1.5)) for name in names if kind == 2})
+    return with_positions(
+        robot, {name: float(rng.uniform(-1.5, 1.5)) for name in names if kind == 2})
 
 
 @pytest.mark.parametrize('seeds', [

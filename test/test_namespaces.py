@@ -56,7 +56,7 @@ def requested(kind):
 
 def expected(kind, given):
     """Return the library's values, and the size of each output."""
-    rows = linkage(kind).posed(*requested(kind)).searched(*given)
+    rows = linkage(kind).compiled_pose(*requested(kind)).searched(*given)
     # Some rates vanish, and are differences of others.
     return rows, np.fmax(np.nanmax(np.abs(rows), axis=1, keepdims=True),
                          min(linkage(kind).longest, 1.0))
@@ -207,7 +207,7 @@ def test_every_output_has_the_library_s_choice(kind):
             continue  # it does not move
         if not inverse.closed:
             continue
-        values = mechanism.posed((), (output,)).searched(given)[0]
+        values = mechanism.compiled_pose((), (output,)).searched(given)[0]
         values += math.tau * rng.integers(-2, 3, FEW) * mechanism.is_angle(output)
         follows, tried = tried % 2 > 0, tried + 1
         with np.errstate(divide='raise', invalid='raise', over='raise'):
@@ -294,7 +294,7 @@ def moving(kind):
     """Return the joints whose rates are compared, and the library's (outputs, inputs, poses)."""
     mechanism, given = linkage(kind), inputs(kind, MANY)
     joints = ('pitch', 'roll') if kind == 'ankle' else mechanism.joints
-    rates = mechanism.posed((), (), joints).searched(*given)
+    rates = mechanism.compiled_pose((), (), joints).searched(*given)
     return joints, given, rates.reshape(len(given), len(joints), MANY).swapaxes(0, 1)
 
 
@@ -327,7 +327,7 @@ def test_both_have_the_inverse_and_its_rates(kind, package, request):
     assert np.quantile(off, 0.99) < EXACT and off.max() < 1e-8
     found, n = slopes(package, xp, kind, function, given), len(rows)
     assert not found[:, n:].any() and np.isfinite(found).all()
-    rates = linkage(kind).posed((), INVERSES[kind], INVERSES[kind]).searched(*rows)[n:]
+    rates = linkage(kind).compiled_pose((), INVERSES[kind], INVERSES[kind]).searched(*rows)[n:]
     # The derivatives of an inverse are the inverse of the derivatives, by input and output.
     product = np.einsum('ijk,ljk->lik', rates.reshape(n, n, -1), found[:, :n])
     off = abs(product - np.eye(n)[..., None]).max(axis=(0, 1))

@@ -213,4 +213,4 @@ os._exit(not np.array_equal(linkage.solve(thetas, ['G'])['G'], before))
 def test_what_is_compiled_serves_all_dimensions():
     linkage = mechanisms.create('jansen').accelerated()
     grown = linkage.with_dimensions(m=16.0)
-    assert linkage.posed().variant.arrays is grown.posed().variant.arrays
+    assert linkage.compiled_pose().variant.arrays is grown.compiled_pose().variant.arrays

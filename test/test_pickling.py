@@ -59,7 +59,7 @@ def test_a_copy_answers_the_same(name, way):
 def test_a_copy_has_the_code_of_what_it_was_copied_from(name):
     linkage = LINKAGES[name]
     other = pickle.loads(pickle.dumps(linkage))
-    assert other.posed().variant is linkage.posed().variant
+    assert other.compiled_pose().variant is linkage.compiled_pose().variant
 
 
 def test_a_copy_of_an_accelerated_one_is_accelerated():

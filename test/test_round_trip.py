@@ -10,7 +10,7 @@ from linkage_ros import scene
 from linkage_ros.linkage import theta_of
 from linkage_ros.robot_files import readers
 from linkage_ros.robot_model import bodies, mjcf, sdf, urdf
-from linkage_ros.robot_model.robot import posed
+from linkage_ros.robot_model.robot import with_positions
 import numpy as np
 import pytest
 from robots import of_text, ROBOTS, turned
@@ -26,7 +26,7 @@ def check_read(robot, form, folder):
     file = of_text(folder / 'robot.xml', FORMATS[form](robot))
     read, root = readers.read(str(file)), {'urdf': robot.root}.get(form, 'world')
     if form == 'urdf':
-        robot = posed(robot, dict.fromkeys(robot.positions, 0.0))
+        robot = with_positions(robot, dict.fromkeys(robot.positions, 0.0))
     # The pose of the ground that carries each body.
     frames, stands = ({robot.root: np.eye(4)} for _ in range(2))
     for body, (base, _) in robot.spanning_tree()[0].items():

@@ -36,7 +36,7 @@ def series(linkage: Mechanism, output: str, parts: np.ndarray, single: bool,
         If there are too many.
 
     """
-    unit, pose = linkage.inputs[0].size, linkage.posed((), (output,))
+    unit, pose = linkage.inputs[0].size, linkage.compiled_pose((), (output,))
     is_angle, terms = linkage.is_angle(output), TERMS[single]
     size = 1.0 if is_angle else linkage.longest
     nodes = chebyshev.chebpts1(terms)

@@ -194,6 +194,6 @@ class Tables:
         low, high = linkage.monotone(output).T[:2, :, None]
         inputs = (low + steps * (high - low)).ravel()
         found = linkage.bind(Program([x for x, in solutions])).over(
-            *linkage.posed((), (output,)).over(inputs))
+            *linkage.compiled_pose((), (output,)).over(inputs))
         apart = linkage.inputs[0].apart(found, inputs)
         return sorted({*np.where(np.isfinite(apart), apart, math.inf).argmin(axis=0).tolist()})

@@ -363,12 +363,12 @@ class Kinematics:
         if self.shape:
             raise ValueError('a function is for one set of dimensions, not for arrays')
         if xp is None:
-            return self.posed(points, joints, rates).at
+            return self.compiled_pose(points, joints, rates).at
         outputs = self.structure.parts(self._requested(points, joints, rates))
         return array_function(outputs, len(self.inputs), xp, self.dimensions, IN_SINGLE)
 
-    def posed(self, points: Names = None, joints: Sequence[str] = (),
-              rates: Sequence[str] = ()) -> CompiledFunction:
+    def compiled_pose(self, points: Names = None, joints: Sequence[str] = (),
+                      rates: Sequence[str] = ()) -> CompiledFunction:
         """Return the code behind `function`."""
         return self.compiled('parts', self._requested(points, joints, rates))
 

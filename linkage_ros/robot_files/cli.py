@@ -17,7 +17,7 @@ from . import check, closing, planar, readers, rods
 from .spatial import components
 from .. import cli, scene
 from ..linkage import short
-from ..robot_model.robot import FIXED, HINGE, MAX_NUMBER, NotDriven, posed, Robot, SLIDE
+from ..robot_model.robot import FIXED, HINGE, MAX_NUMBER, NotDriven, Robot, SLIDE, with_positions
 from ..scene.writing import in_yaml
 from ..words import join_names, sentence, truncated
 
@@ -54,7 +54,7 @@ def show(args: list[str] | None) -> None:
         robot = readers.read(arguments.file, arguments.loops)
         robot.driven = arguments.driven or robot.driven
         robot.check_names(arguments.driven or ())
-        robot = posed(robot, positions(arguments.pose))
+        robot = with_positions(robot, positions(arguments.pose))
         robot = closing.held(robot, {**robot.held, **positions(arguments.hold)})
         parameters, reports, still = described(robot)
     # Unprintable characters in names of the file could end a comment.

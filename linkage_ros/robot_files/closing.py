@@ -14,7 +14,7 @@ from typing import Iterable, Mapping, NamedTuple, Sequence
 import numpy as np
 
 from .spatial import ASKEW, Component, components, DEAD_POINT, is_free
-from ..robot_model.robot import FIXED, NotDriven, posed, Robot
+from ..robot_model.robot import FIXED, NotDriven, Robot, with_positions
 from ..words import join_names
 
 # A gap that is smaller, of the size of its loops, is rounding: files have angles such as 1.5708.
@@ -45,7 +45,7 @@ def held(robot: Robot, values: Mapping[str, float]) -> Robot:
         name: ratio * values[source] + offset for name in robot.follows.keys() & robot.positions
         for source, ratio, offset in reversed(robot.sources(name))
         if source in values and name not in values}}
-    made = posed(robot, values)
+    made = with_positions(robot, values)
     return replace(made, joints=[
         replace(joint, kind=FIXED, position=None) if joint.name in values else joint
         for joint in made.joints])
@@ -84,7 +84,7 @@ def closed(robot: Robot, seed: int = 0) -> Closed:
         if joint.position is not None and not low <= joint.position <= high:
             margin = INSIDE * min(high - low, 1.0)
             inside[joint.name] = low + margin if joint.position < low else high - margin
-    other = _closed(posed(robot, inside), seed)
+    other = _closed(with_positions(robot, inside), seed)
     if len(other.faults) >= len(made.faults):
         return made
     where = ', '.join(f'{name} at {value:.4g}' for name, value in inside.items())
@@ -94,9 +94,9 @@ def closed(robot: Robot, seed: int = 0) -> Closed:
 
 def _closed(robot: Robot, seed: int) -> Closed:
     # Dependent joints are where the others say.
-    robot = posed(robot, {name: ratio * robot.positions[source] + offset
-                          for name in robot.positions.keys() & robot.follows
-                          for source, ratio, offset in [robot.source(name)]})
+    robot = with_positions(robot, {name: ratio * robot.positions[source] + offset
+                                   for name in robot.positions.keys() & robot.follows
+                                   for source, ratio, offset in [robot.source(name)]})
     made = Closed(robot, [], {})
     moves: dict[str, np.ndarray] = {}
     positions: dict[str, float] = {}
@@ -117,7 +117,7 @@ def _closed(robot: Robot, seed: int) -> Closed:
                 _check_driven(component, pose, motors, followers)
         except ValueError as error:
             made.faults.update((joint.name, error) for joint in component.joints)
-    return made._replace(robot=posed(robot, positions, moves))
+    return made._replace(robot=with_positions(robot, positions, moves))
 
 
 def _added(*options: tuple[str, Iterable[str]]) -> str:

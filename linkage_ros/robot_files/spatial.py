@@ -213,12 +213,12 @@ class Component:
         slope = rates.sum(axis=2).swapaxes(2, 3)
         return error, slope.reshape(*error.shape, -1) * self.unit
 
-    def closed(self, poses: np.ndarray, fixed: np.ndarray, count: int = 12, pull: float = 0.0,
+    def closed(self, poses: np.ndarray, fixed: np.ndarray, count: int = 12, spring: float = 0.0,
                soft: float = 1e-14) -> np.ndarray:
         """
         Return poses after so many steps of Newton's method, or fewer if they are closed.
 
-        The screws that are `fixed` do not move. `pull` draws poses to that of the file, by half
+        The screws that are `fixed` do not move. `spring` draws poses to that of the file, by half
         as much in each step. `soft` damps motions that the loops hardly resist. Both are parts of
         the loops' stiffness.
         """
@@ -229,8 +229,8 @@ class Component:
             down = slope.swapaxes(1, 2)
             square, force = down @ slope, (down @ error[:, :, None])[..., 0]
             weight = soft * np.einsum('pii->p', square)[:, None]
-            if pull:
-                weight *= 1.0 + max(pull * 0.5 ** i, 1e-13) / soft
+            if spring:
+                weight *= 1.0 + max(spring * 0.5 ** i, 1e-13) / soft
                 force += weight * (poses / self.unit)[:, free]
             square += (weight[:, :, None] + 1e-300) * np.eye(free.sum())
             step = np.linalg.solve(square, force[..., None])[..., 0]

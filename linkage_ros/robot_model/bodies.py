@@ -29,7 +29,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from . import shapes
-from .robot import FREE, HINGE, posed, Robot, SLIDE
+from .robot import FREE, HINGE, Robot, SLIDE, with_positions
 from .shapes import BALL, BOX, CYLINDER, Piece, Place, weight
 from .. import palette
 from ..linkage import Arc, extremes, GROUND, Leg, Link
@@ -261,7 +261,7 @@ def _started(mechanism: SceneMechanism, part: Robot, density: float) -> Robot:
         raise SceneError(f'{keys} must be where {mechanism.name} can be assembled, not at '
                          f'{", ".join(f"{start:g}" for start in starts)}')
     positions = {joints[name].name: joints[name].of(value) for name, value in values.items()}
-    robot = posed(part, {name: positions[name] for name in part.positions})
+    robot = with_positions(part, {name: positions[name] for name in part.positions})
     _add_slots(mechanism, robot)
     mass = sum(weight(pieces, density)[0] for pieces in robot.pieces.values() if pieces)
     tips = {link.name: link.tip for link in linkage.links}

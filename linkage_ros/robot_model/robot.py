@@ -403,8 +403,8 @@ def _limits(limits: Sequence[Any], is_continuous: bool) -> tuple[tuple[float, fl
     return ((low, high), '') if low < high else (None, f'{text}: they are no range')
 
 
-def posed(robot: Robot, values: Mapping[str, float],
-          moves: Mapping[str, np.ndarray] = {}) -> Robot:
+def with_positions(robot: Robot, values: Mapping[str, float],
+                   moves: Mapping[str, np.ndarray] = {}) -> Robot:
     """
     Return a robot with some joints moved; raise RequestError for an unknown joint.
 

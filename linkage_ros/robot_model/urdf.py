@@ -19,7 +19,7 @@ import numpy as np
 
 from . import bodies
 from .bodies import add, COLOURS
-from .robot import Body, HINGE, posed, Robot
+from .robot import Body, HINGE, Robot, with_positions
 from .shapes import Piece
 from ..scene import SceneMechanism
 
@@ -34,7 +34,7 @@ def describe(mechanisms: Iterable[SceneMechanism], frame_id: str) -> str:
 
 def write(robot: Robot) -> str:
     """Return a robot as URDF, which has it with all joints at zero."""
-    robot = posed(robot, dict.fromkeys(robot.positions, 0.0))
+    robot = with_positions(robot, dict.fromkeys(robot.positions, 0.0))
     root = Element('robot', name=robot.name)
     for colour, rgba in COLOURS.items():
         add(add(root, 'material', name=colour), 'color', rgba=rgba)

@@ -45,8 +45,8 @@ def nearest_inputs(linkage: Mechanism, joint: str, place: Sequence[float],
         if not np.isfinite(rates).all():
             break
         # An input at its end stays there if the gap pulls it beyond.
-        pull = gap @ rates
-        free = ~((value <= low) & (pull < 0.0) | (value >= high) & (pull > 0.0))
+        descent = gap @ rates
+        free = ~((value <= low) & (descent < 0.0) | (value >= high) & (descent > 0.0))
         step = sizes * np.linalg.lstsq(rates * free, gap, rcond=None)[0]
         for part in 0.5 ** np.arange(STEP_HALVINGS):
             tried = np.clip(value + part * step, low, high)

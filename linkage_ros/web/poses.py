@@ -187,8 +187,8 @@ def _input_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
     places = mechanism.linkage.solve(mechanism.theta(inputs))
     if not all(math.isfinite(part) for place in places.values() for part in place):
         raise SceneError(f'{mechanism.name} cannot be assembled there')
-    is_missed = input_.apart(new, input_.wrapped(value)) > CLOSE * input_.size
-    return inputs, {'name': name, 'arcs': arcs, 'unit': input_.unit} if is_missed else None
+    is_outside = input_.apart(new, input_.wrapped(value)) > CLOSE * input_.size
+    return inputs, {'name': name, 'arcs': arcs, 'unit': input_.unit} if is_outside else None
 
 
 def _output_at(mechanism: SceneMechanism, present: Sequence[float], name: str,

@@ -142,7 +142,7 @@ def decompose(linkage: Kinematics, outputs: Names) -> InverseLinkage | None:
 def _pose(linkage: Kinematics) -> dict[str, float] | None:
     """Return all joint angles and coordinates in a generic pose, away from dead points."""
     names = (*linkage.joints, *(f'{point}.{axis}' for point in linkage.points for axis in 'xy'))
-    rows = linkage.posed((), names).searched(*spread(linkage.inputs, TRIES))
+    rows = linkage.compiled_pose((), names).searched(*spread(linkage.inputs, TRIES))
     known = rows[:, np.isfinite(rows).all(axis=0)]
     return dict(zip(names, known[:, 0].tolist())) if known.size else None
 
