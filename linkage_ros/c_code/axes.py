@@ -74,7 +74,7 @@ def joints(mechanism: SceneMechanism, names: Sequence[str] = ()) -> list[Axis]:
         If one does not exist, they do not determine all inputs, or there is no inverse.
 
     """
-    outputs = [found[0] for name in names if (found := mechanism.output_named(name))
+    outputs = [named[0] for name in names if (named := mechanism.output_named(name))
                ] if names else _chain(mechanism)
     if len({*outputs}) != len(mechanism.inputs):
         raise ValueError(f'{mechanism.name} has {len(mechanism.inputs)} inputs: as many of its '
@@ -84,7 +84,7 @@ def joints(mechanism: SceneMechanism, names: Sequence[str] = ()) -> list[Axis]:
 
 def passive(mechanism: SceneMechanism, commanded: Sequence[Axis]) -> list[Axis]:
     """Return the joints of the first leg's links that are not commanded."""
-    outputs = [each.output for each in commanded]
+    outputs = [joint.output for joint in commanded]
     return [_joint(mechanism, name) for name in mechanism.linkage.joints if name not in outputs]
 
 
@@ -96,9 +96,9 @@ def _joint(mechanism: SceneMechanism, output: str) -> Axis:
 
 def invertible(mechanism: SceneMechanism, axes: list[Axis]) -> list[Axis]:
     """Return axes; raise ValueError if positions of them do not give the inputs for certain."""
-    linkage, names = mechanism.linkage, [each.output for each in axes]
+    linkage, names = mechanism.linkage, [joint.output for joint in axes]
     what = f'{join_names(names)} of {mechanism.name}'
-    if len({each.input for each in axes} - {None}) == len(axes):
+    if len({joint.input for joint in axes} - {None}) == len(axes):
         return axes
     if any(input_.is_part for input_ in linkage.inputs):
         raise ValueError(f'{what} has no inverse, since it repeats after too many turns')

@@ -50,7 +50,7 @@ class Formulas:
             'by_places': ', '.join(f'&{by}' for by in self.by),
             'by_pointers': ', '.join(f'{mechanism.name}_pose *{by}' for by in self.by),
             'arguments': ', '.join(self._parameters),
-            'parameters': ', '.join(f'{code.number} {each}' for each in self._parameters),
+            'parameters': ', '.join(f'{code.number} {name}' for name in self._parameters),
             'inputs_named': ' and by '.join(mechanism.inputs),
             'elements': ', '.join(f'q[{i}]' for i in range(len(self.by)))}
         # Points in space are of no use on a board.
@@ -58,7 +58,7 @@ class Formulas:
         named = dict.fromkeys((
             *(f'{point}.{axis}' for point in self._points for axis in 'xy'), *linkage.joints,
             *outputs))
-        self.fields = dict(zip(named, distinct(field(linkage, each) for each in named)))
+        self.fields = dict(zip(named, distinct(field(linkage, output) for output in named)))
 
     def struct(self) -> str:
         """Return the fields of a pose."""
@@ -87,8 +87,8 @@ class Formulas:
             '/* The pose; with has_rates, rates by {inputs_named}. Returns 0 beyond a limit. */\n'
             'LKR_FORMULA int {name}_formulas({parameters}, int has_rates, {name}_pose *p,\n'
             '    {by_pointers})'.format(**self.names),
-            [self._code.times(each, 1.0 / scale)
-             for each, scale in zip(self._parameters, self._mechanism.scales)],
+            [self._code.times(parameter, 1.0 / scale)
+             for parameter, scale in zip(self._parameters, self._mechanism.scales)],
             [*poses, ('', {f'const {self._code.number} valid': valid}),
              ('if (!has_rates) {\n    return isfinite(valid);\n}', {}), *rates],
             'return isfinite(valid);')

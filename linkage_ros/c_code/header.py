@@ -94,7 +94,7 @@ def _values(request: Request, single: bool) -> dict[str, Any]:
         parts += [tables.text(([], axes), tag), _inverse(mechanism, axes, tag, code.number)]
     _, counts, functions = zip(*tables.solutions.values())
     about = [*_about(mechanism), f'A call takes at most {POSES * max(counts) + 1} poses.']
-    whole = ' + '.join(f'p->{each}' for each in formulas.fields.values())
+    whole = ' + '.join(f'p->{member}' for member in formulas.fields.values())
     return {
         'about': '\n'.join(f' * {line}' for line in about),
         **formulas.names, 'N': prefix(name), 'float': int(single),

@@ -70,12 +70,12 @@ def series(linkage: Mechanism, output: str, parts: np.ndarray, single: bool,
     halves = halves[halves[:, 3] != 0.0]
     rows = np.empty((0, 7 + terms))
     # Between roots of the parts of a half's change: those that are too long are cut in two.
-    own, roots = np.arange(len(halves)), np.tile([0.0, 1.0], (len(halves), 1))
-    while len(own):
-        if len(rows) + len(own) > MAX_PIECES:
+    half_of, roots = np.arange(len(halves)), np.tile([0.0, 1.0], (len(halves), 1))
+    while len(half_of):
+        if len(rows) + len(half_of) > MAX_PIECES:
             raise ValueError(f'{output} of {linkage.type} has no inverse: it has no closed form, '
                              f'and a series of more than {MAX_PIECES} pieces')
-        start, cut, end, change = halves[own].T[..., None]
+        start, cut, end, change = halves[half_of].T[..., None]
         center, half = roots.mean(axis=1, keepdims=True), 0.5 * np.diff(roots)
         squares = roots ** 2
         bounds = np.sort(halved(squares, start, cut, end, change))
@@ -83,8 +83,8 @@ def series(linkage: Mechanism, output: str, parts: np.ndarray, single: bool,
             (center + half * nodes) ** 2, start, cut, end, change).T, terms - 1)
         inputs = polynomial.polyval(checked, fitted).clip(
             np.minimum(start, cut), np.maximum(start, cut))
-        found = passed(inputs, end, change)
-        missed, digit = (np.abs(others - found).max(axis=1, keepdims=True) for others in (
+        reached = passed(inputs, end, change)
+        missed, digit = (np.abs(others - reached).max(axis=1, keepdims=True) for others in (
             (center + half * checked) ** 2, passed(np.nextafter(inputs, cut), end, change)))
         is_done = ((missed <= np.maximum(CLOSE[single] * size / np.abs(change), DIGITS * digit))
                    | (np.diff(bounds) < SHORTEST))[:, 0]
@@ -97,5 +97,5 @@ def series(linkage: Mechanism, output: str, parts: np.ndarray, single: bool,
         rows = np.vstack([rows, pieces[is_done]])
         ends = np.insert(roots[~is_done], [1], center[~is_done], axis=1)
         roots = np.vstack([ends[:, :2], ends[:, 1:]])
-        own = np.tile(own[~is_done], 2)
+        half_of = np.tile(half_of[~is_done], 2)
     return rows[rows[:, 2].argsort(kind='stable')]

@@ -68,8 +68,8 @@ class Tables:
             'n': len(self.mechanism.scales), 'counts': ', '.join(str(len(axes)) for axes in rows),
             'names': ', '.join(map(self._solutions, sides)),
             'at': indented(self._at(rows, len(sides[1]))),
-            'axes': row(row((1.0 / each.size, each.turn or math.inf)
-                            for each in axes) if axes else '{ { 0, 0 } }'
+            'axes': row(row((1.0 / axis.size, axis.turn or math.inf)
+                            for axis in axes) if axes else '{ { 0, 0 } }'
                            for axes in rows),
             'inputs': row(self._inputs(sides, has_sweeps=not tag)),
             'start': row(start(self.mechanism))})
@@ -79,14 +79,14 @@ class Tables:
         code, formulas, scale_of = self._code, self._formulas, self.mechanism.scale_of
         needed = []
         for side, axes in enumerate(sides):
-            for i, each in enumerate(axes):
-                field, factor = formulas.fields[each.output], each.factor / scale_of(each.output)
+            for i, axis in enumerate(axes):
+                field, factor = formulas.fields[axis.output], axis.factor / scale_of(axis.output)
                 position, *rates = [code.times(f'{struct}.{field}', factor)
                                     for struct in ('s', *formulas.by)]
-                if each.offset:
-                    position += f' + {code.literal(each.offset)}'
-                if each.wraps:
-                    position = f'lkr_wrapped({position}, {code.literal(each.turn)})'
+                if axis.offset:
+                    position += f' + {code.literal(axis.offset)}'
+                if axis.wraps:
+                    position = f'lkr_wrapped({position}, {code.literal(axis.turn)})'
                 yield f'p->position[{side}][{i}] = {position};'
                 yield from (f'p->rate[{side}][{i}][{j}] = {rate};' for j, rate in enumerate(rates))
                 needed += [f'p->position[{side}][{i}]'] * (i < commanded)
@@ -101,11 +101,11 @@ class Tables:
 
     def _inputs(self, sides: Sequence[Sequence[Axis]], has_sweeps: bool) -> Iterator[tuple]:
         """Yield the rows of the inputs, as `lkr_input` has them."""
-        counted = [{each.input for each in axes} for axes in sides]
+        counted = [{axis.input for axis in axes} for axes in sides]
         for i, settings in enumerate(self.mechanism.inputs.values()):
             input_, sweep = self.linkage.inputs[i], has_sweeps and settings.ends
-            turns = [input_.turn if input_.wraps and i not in each else math.inf
-                     for each in counted]
+            turns = [input_.turn if input_.wraps and i not in inputs else math.inf
+                     for inputs in counted]
             size = self.mechanism.scales[i] * input_.size
             yield size, 1.0 / size, *(sweep or ('-LKR_ENDLESS', 'LKR_ENDLESS')), turns
 
@@ -113,25 +113,25 @@ class Tables:
 
     def _solutions(self, axes: Sequence[Axis]) -> str:
         """Return the name of the function for all inputs of outputs, and note it; 0: none."""
-        outputs = tuple(each.output for each in axes)
+        outputs = tuple(axis.output for axis in axes)
         if not axes:
             return '0'
         # Axes of the same outputs may have other signs and offsets.
-        key = tuple((each.output, each.factor, each.offset) for each in axes)
+        key = tuple((axis.output, axis.factor, axis.offset) for axis in axes)
         if key not in self.solutions:
             name = '_'.join([f'{self.mechanism.name}_solutions', *(
                 self._formulas.fields[output] for output in outputs)])
-            *_, name = distinct([*(each for each, *_ in self.solutions.values()), name])
-            counted = {each.input: (argument(i) - shift) / ratio
-                       for i, each in enumerate(axes) if each.input is not None
-                       for ratio, shift in [self.linkage.gear(each.output, each.input)]}
+            *_, name = distinct([*(known for known, *_ in self.solutions.values()), name])
+            counted = {axis.input: (argument(i) - shift) / ratio
+                       for i, axis in enumerate(axes) if axis.input is not None
+                       for ratio, shift in [self.linkage.gear(axis.output, axis.input)]}
             if len(counted) == len(axes):
-                found = self._function(name, axes, 'The inputs.', [('', counted)])
+                generated = self._function(name, axes, 'The inputs.', [('', counted)])
             elif closed := self.linkage.inverse(outputs).closed:
-                found = self._closed(name, axes, counted, closed)
+                generated = self._closed(name, axes, counted, closed)
             else:
-                found = self._series(name, *axes)
-            self.solutions[key] = name, *found
+                generated = self._series(name, *axes)
+            self.solutions[key] = name, *generated
         return self.solutions[key][0]
 
     def _value(self, i: int, axis: Axis) -> str:
@@ -144,9 +144,9 @@ class Tables:
     def _series(self, name: str, axis: Axis) -> tuple[int, str]:
         """Return the most inputs of an output, and the function for them by series."""
         code, monotone = self._code, self.linkage.monotone(axis.output)
-        found = series(self.linkage, axis.output, monotone, code.single, *self.mechanism.scales)
-        rows = [f'    {code.row([*row[:7], row[7:]])},' for row in found.tolist()]
-        given = ', '.join([*(code.literal(each / abs(axis.factor)) for each in (
+        pieces = series(self.linkage, axis.output, monotone, code.single, *self.mechanism.scales)
+        rows = [f'    {code.row([*row[:7], row[7:]])},' for row in pieces.tolist()]
+        arguments = ', '.join([*(code.literal(value / abs(axis.factor)) for value in (
             axis.size, axis.turn or math.inf)), self._value(0, axis)])
         # Where two pieces of a monotone part meet, both have the input.
         return min(len(rows), 2 * len(monotone)), '\n'.join([
@@ -155,13 +155,14 @@ class Tables:
             f'    {code.number} (*q)[LKR_MAX_INPUTS])', '{',
             f'    static const lkr_piece piece[{len(rows)}] LKR_IN_FLASH = {{',
             indented(rows), '    };',
-            f'    return lkr_series({len(rows)}, piece, {given}, q);', '}'])
+            f'    return lkr_series({len(rows)}, piece, {arguments}, q);', '}'])
 
     def _closed(self, name: str, axes: Sequence[Axis], counted: Mapping[int, Real],
                 closed: InverseLinkage) -> tuple[int, str]:
         """Return the number of solutions of an inverse linkage, and the function for them."""
-        found, solutions = closed.solutions(), []
-        for (signs, turns), inputs in zip(product(closed.modes, product(*closed.turns)), found):
+        candidates, solutions = closed.solutions(), []
+        for (signs, turns), inputs in zip(
+                product(closed.modes, product(*closed.turns)), candidates):
             # If an input has a period of several turns, each turn has its own pose.
             if not any(turns[i] for i in counted):
                 sides = ', '.join(f'{joint} {"left" if sign > 0.0 else "right"}'
@@ -169,7 +170,8 @@ class Tables:
                 solutions.append((f'/* {sides} */' if sides and not any(turns) else '', {
                     i: counted.get(i, value) for i, value in enumerate(inputs)}))
         if len(axes) == 1:
-            solutions = [solutions[k] for k in self._in_reach(axes[0].output, found)] or solutions
+            solutions = [solutions[k] for k in self._in_reach(
+                axes[0].output, candidates)] or solutions
         lines = ''.join(f'\n     {comment(line)}' for line in closed.lines)
         return self._function(
             name, axes, 'The inputs in each assembly mode of the inverse linkage, NAN where there '

@@ -77,16 +77,16 @@ class Real:
 
     def __mul__(self, other: Number) -> Real:
         other = real(other)
-        for one, rest in ((self, other), (other, self)):
-            if one.value == 0.0:
-                return one
-            if one.value == 1.0:
+        for factor, rest in ((self, other), (other, self)):
+            if factor.value == 0.0:
+                return factor
+            if factor.value == 1.0:
                 return rest
-            if one.value is not None and one.value < 0.0 and rest.value is None:
-                return -(real(-one.value) * rest)
-        for one, rest in ((self, other), (other, self)):
-            if one.op == 'negative':
-                return -(one.args[0] * rest)
+            if factor.value is not None and factor.value < 0.0 and rest.value is None:
+                return -(real(-factor.value) * rest)
+        for factor, rest in ((self, other), (other, self)):
+            if factor.op == 'negative':
+                return -(factor.args[0] * rest)
         return operation('multiply', self, other)
 
     def __truediv__(self, other: Number) -> Real:

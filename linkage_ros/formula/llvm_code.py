@@ -128,18 +128,19 @@ class Arrays(Loop):
         self._outputs = len(outputs)
         self._share = SHARE // (1 + len(operations))
 
-    def solve(self, given: Sequence[np.ndarray], constants: np.ndarray) -> np.ndarray:
+    def solve(self, arguments: Sequence[np.ndarray], constants: np.ndarray) -> np.ndarray:
         """Return the outputs, shape (outputs, poses), at arguments that are arrays (poses,)."""
-        size = given[0].size
+        size = arguments[0].size
         if size < LANES:
-            return self.solve([np.resize(each, LANES) for each in given], constants)[:, :size]
+            return self.solve(
+                [np.resize(array, LANES) for array in arguments], constants)[:, :size]
         out = np.empty((self._outputs, size))
         cores = _cores() if size > self._share else 1
         share = max(self._share, -(-size // cores))
 
         def solve_from(first: int) -> None:
             # These references keep the arrays alive while threads use them.
-            self.bound(given, constants, out)(first, min(first + share, size))
+            self.bound(arguments, constants, out)(first, min(first + share, size))
 
         others = [_threads(os.getpid(), cores).submit(solve_from, first)
                   for first in range(share, size, share)]
@@ -172,10 +173,10 @@ def _module(kind: ir.Type, operations: Sequence, constants: Sequence[int],
     module, pointer, lanes = ir.Module(), NUMBER.as_pointer(), getattr(kind, 'count', 1)
     poses = ir.Function(module, ir.FunctionType(
         ir.VoidType(), [*3 * (COUNT,), pointer.as_pointer(), pointer, pointer]), 'poses')
-    first, last, size, arguments, given, out = poses.args
+    first, last, size, arguments, constant_array, out = poses.args
     builder = Builder(poses.append_basic_block())
     spell = builder.operations() if kind == NUMBER else _operators(builder)
-    known = {number: _in_all_lanes(builder, kind, _load(builder, given, _count(i)))
+    known = {number: _in_all_lanes(builder, kind, _load(builder, constant_array, _count(i)))
              for i, number in enumerate(constants)}
 
     def numbers(array: ir.Value, offset: ir.Value) -> ir.Value:

@@ -64,7 +64,7 @@ def array_function(outputs: Sequence[Real], arguments: int, xp: Any, dimensions:
 def _of_floats_too(name: str, xp: Any, dtype: Any) -> Callable:
     """Return a function of arrays, by its name in array code, that allows floats beside them."""
     names = {'absolute': ('abs',), 'rint': ('round',), 'atan2': ('atan2', 'arctan2')}
-    function = next(getattr(xp, each) for each in names.get(name, (name,)) if hasattr(xp, each))
+    function = next(getattr(xp, known) for known in names.get(name, (name,)) if hasattr(xp, known))
 
     def applied(*operands: Any) -> Any:
         arrays = [x for x in operands if type(x) is not float]

@@ -117,16 +117,16 @@ def _python(listing: Listing, dialect: Dialect, arguments: int) -> Callable:
     """
     lines, outputs = listing.statements(dialect)
     ending = f'return ({"".join(code + ", " for code in outputs)})'
-    given = ', '.join(f'x{i}' for i in range(arguments))
+    parameters = ', '.join(f'x{i}' for i in range(arguments))
     if dialect.templates is ARRAYS.templates:
         body = [*_with_releases(lines, outputs), ending]
     else:
         body = ['try:', *(f'    {line}' for line in [
             *(f'{name} = {code}' for name, code in lines), ending]),
-            'except (ArithmeticError, ValueError):', f'    return instead({given})']
+            'except (ArithmeticError, ValueError):', f'    return instead({parameters})']
     source = '\n'.join([
         f'def bind({"".join(f"k{n}, " for n in listing.constants)}instead=None):',
-        f'    def pose({given}):', *(f'        {line}' for line in body), '    return pose'])
+        f'    def pose({parameters}):', *(f'        {line}' for line in body), '    return pose'])
     scope = dict(dialect.names)
     exec(compile(source, '<linkage_ros formula>', 'exec'), scope)
     return scope['bind']

@@ -224,7 +224,7 @@ class Dyads:
                 if abs(end - start) > self.near for seen in ((place - start) / (end - start),)]
         if body == self.ground:
             line = f'ground {text(place.real)} {text(place.imag)}'
-        elif part.slide and [each.joint for each in self.parts.values() if each.slide].count(
+        elif part.slide and [other.joint for other in self.parts.values() if other.slide].count(
                 part.joint) > 1:
             raise ValueError(f'joint {part.joint} carries two blocks; `block` allows one')
         elif part.slide:
@@ -352,7 +352,8 @@ class Dyads:
     def _dyad(self, first: str) -> bool:
         for second, pin in self.rods(first) if self.on[first] else ():
             one, two = self.end(first), self.end(second)
-            if one[0] == two[0] or any({first, second} == {*each.bodies} for each in self.motors):
+            if one[0] == two[0] or any(
+                    {first, second} == {*motor.bodies} for motor in self.motors):
                 continue
             ends = self.place_in_pose(first, one[1]), self.place_in_pose(second, two[1])
             if abs(ends[0] - ends[1]) < self.near:
@@ -406,14 +407,14 @@ class Dyads:
     def _yoke(self, slide: Slide, way: int) -> bool:
         base, block = slide.bodies[way], slide.bodies[1 - way]
         for slot in self.slides:
-            own = int(slot.bodies[1] == block)
-            pin_body, along = slot.bodies[1 - own], slide.axes[1 - way]
+            slot_way = int(slot.bodies[1] == block)
+            pin_body, along = slot.bodies[1 - slot_way], slide.axes[1 - way]
             if slot is slide or block not in slot.bodies or pin_body in self.parts or \
-                    abs((slot.axes[own] / along).real) > ROUNDING or not self.on[pin_body]:
+                    abs((slot.axes[slot_way] / along).real) > ROUNDING or not self.on[pin_body]:
                 continue
             pin, at = self.end(pin_body)
-            aside = ((at - slot.origins[1 - own]) / slot.axes[1 - own]).imag
-            ahead = ((slot.origins[own] + 1j * slot.axes[own] * aside
+            aside = ((at - slot.origins[1 - slot_way]) / slot.axes[1 - slot_way]).imag
+            ahead = ((slot.origins[slot_way] + 1j * slot.axes[slot_way] * aside
                       - slide.origins[1 - way]) / along).real
             (start, on_base), towards, on = self.line(base, slide.origins[way], slide.axes[way])
             number = self.number('slider', 'yoke')
@@ -421,5 +422,5 @@ class Dyads:
                              f'yoke {pin} {start} along {towards}')
             return self.place(block, Part(f'block{number}', name, along * (on / slide.axes[way]),
                                           slide.joint, on_base)) and self.place(
-                pin_body, Part('', pin, slot.axes[1 - own]))
+                pin_body, Part('', pin, slot.axes[1 - slot_way]))
         return False

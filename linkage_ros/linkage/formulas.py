@@ -73,8 +73,8 @@ class LinkageFormulas:
         self.built = Builder(dict(design.turned))
         symbols = {name: dimension(name, positive=name not in design.signed)
                    for name in design.dimensions}
-        given = {'inputs': design.inputs} if design.inputs else {}
-        design.words.draw(self.built, design.lines, symbols, branches, **given)
+        options = {'inputs': design.inputs} if design.inputs else {}
+        design.words.draw(self.built, design.lines, symbols, branches, **options)
         self.branches = dict(branches)
         self._programs, self._moving = Cache(), Cache()
         # Derivatives by each input, which several programs need.
@@ -167,13 +167,14 @@ class LinkageFormulas:
 
     def _legs(self, points: Points, joints: Names, moving: Names) -> Program:
         inputs = self.built.inputs
-        given = [argument(i) for i in range(2 * len(inputs) + len(Leg._fields))]
-        values, speeds, leg = (given[:len(inputs)], given[len(inputs):2 * len(inputs)],
-                               Leg(*given[2 * len(inputs):]))
+        arguments = [argument(i) for i in range(2 * len(inputs) + len(Leg._fields))]
+        values, speeds, leg = (arguments[:len(inputs)], arguments[len(inputs):2 * len(inputs)],
+                               Leg(*arguments[2 * len(inputs):]))
         across = leg.side * leg.size
         factors = (across, leg.size, leg.size)[:len(self.built.axes)]
-        own = {own: leg.start + leg.side * (value - leg.lag) if input_.turns else value / leg.size
-               for own, value, input_ in zip(self.built.arguments, values, inputs)}
+        replaced = {
+            old: leg.start + leg.side * (value - leg.lag) if input_.turns else value / leg.size
+            for old, value, input_ in zip(self.built.arguments, values, inputs)}
         turning = [sum((rate * (speed if input_.turns else speed / leg.size)
                         for rate, speed, input_ in zip(rates, speeds, inputs)), real(0.0))
                    for rates in zip(*(self._rates(moving, by) for by in range(len(inputs))))]
@@ -184,7 +185,7 @@ class LinkageFormulas:
                      for name, value in zip(joints, self._angles(joints))),
                    *(value * leg.size if self._slides(name) else value
                      for name, value in zip(moving, turning))]
-        return Program(outputs, len(given), own)
+        return Program(outputs, len(arguments), replaced)
 
     def _slides(self, name: str) -> bool:
         return any(x.name == name and x.kind == 'prismatic' for x in self.built.links)
@@ -229,9 +230,9 @@ class LinkageFormulas:
                 return d(self.output(name))
             if arm := self._arm(name):
                 return turning(arm.vector)
-            own, parent = (turning(directions[link].vector) if link in directions else real(0.0)
-                           for link in (name, parents[name]))
-            return own - parent
+            child, parent = (turning(directions[link].vector) if link in directions else real(0.0)
+                             for link in (name, parents[name]))
+            return child - parent
 
         directions = self.built.directions
         parents = {link.name: link.parent for link in self.built.links}

@@ -74,8 +74,8 @@ class Kinematics:
         evaluate_in_order(self.structure.constants, self.dimensions, self._evaluated)
         self._poses, self.cache = Cache(), Cache()
         self.inputs = tuple(map(self._with_limits, range(len(built.inputs)), built.inputs))
-        own = {input_.name for input_ in self.inputs}
-        self.geared = tuple(name for name in built.driven if name not in own)
+        input_names = {input_.name for input_ in self.inputs}
+        self.geared = tuple(name for name in built.driven if name not in input_names)
         self.links = tuple(link._replace(zero=np.asarray(self.value(link.zero)).tolist())
                            for link in built.links)
 

@@ -120,8 +120,8 @@ class Mechanism(Kinematics):
         if type(value) is not float and numbers('value', value).ndim:
             return inverse.over(value, *fixed)[0][0]
         wanted: Any = (value, *fixed)
-        found = inverse.all(wanted)
-        return np.array([answer.inputs[0] for answer in found] or [math.nan])
+        solutions = inverse.all(wanted)
+        return np.array([solution.inputs[0] for solution in solutions] or [math.nan])
 
     def _fixed(self, others: Any) -> tuple[float, ...]:
         """Return the values of all inputs but the first; raise ValueError if they are not that."""
@@ -143,9 +143,9 @@ class Mechanism(Kinematics):
         Without `near` it is on the working branch, on which lever and crank turn the same way.
         Floats, or arrays in the broadcast shape of value and near; NaN without a solution.
         """
-        (found,), (rate,) = self.inverse(output).nearest(
+        (theta,), (rate,) = self.inverse(output).nearest(
             (value,), None if near is None else (near,), None if ends is None else (ends,))
-        return found, rate
+        return theta, rate
 
     def follow(self, output: str, value: float, near: float) -> tuple[float, float]:
         """
@@ -201,8 +201,8 @@ class Mechanism(Kinematics):
         past -pi and pi. Where the output jumps, as an angle may where its ends meet, not all
         values between the two are reached; see `monotone`.
         """
-        given = numbers('arcs', () if arcs is None else arcs)
-        if given.size and given.shape[1:] != (2,) or not np.isfinite(given).all():
+        pairs = numbers('arcs', () if arcs is None else arcs)
+        if pairs.size and pairs.shape[1:] != (2,) or not np.isfinite(pairs).all():
             raise ValueError(f'arcs must be pairs of two finite numbers, got {short_repr(arcs)}')
         return extremes_of(self, output, arcs, self._fixed(others))
 

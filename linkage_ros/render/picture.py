@@ -53,8 +53,8 @@ class Picture:
         rows = math.ceil(count / columns)
         unit = min(max(min(width / columns, height / rows) / 720, 0.4), 2.0)
         axes = self.figure.subplots(rows, columns, squeeze=False).flat
-        self.panels = [Panel(one, mechanism, motion, trace, parts, unit, count == 1)
-                       for one, mechanism, motion in zip(
+        self.panels = [Panel(panel_axes, mechanism, motion, trace, parts, unit, count == 1)
+                       for panel_axes, mechanism, motion in zip(
                            axes, mechanisms, motions or map(Cycle, mechanisms))]
         for unused in axes[count:]:
             unused.remove()

@@ -73,9 +73,9 @@ class Rods:
             raise ValueError('links on hinges and undriven slides can be joined by rods '
                              f'and cylinders, not by {join_names(wrong)}')
         for body, held in rods.items():
-            one, two = held
-            self._rod(one.name, self._end(one, body), self._end(two, body),
-                      one.place(body) - two.place(body))
+            first, second = held
+            self._rod(first.name, self._end(first, body), self._end(second, body),
+                      first.place(body) - second.place(body))
             self._universal(body, held)
         for half in halves:
             self._cylinder(half, [next(joint for joint in held_by[body] if joint is not half)

@@ -236,10 +236,10 @@ def travels(mechanism: SceneMechanism) -> dict[str, Arc]:
             ends[name] = float(low + turns), float(high + turns)
     others = [name for name in linkage.joints if name not in mechanism.inputs]
     if len(mechanism.inputs) == 1 and others:
-        found = linkage.cache.get_or_make(('travels', *reach), lambda: np.array([[extremes(
+        ranges = linkage.cache.get_or_make(('travels', *reach), lambda: np.array([[extremes(
             lambda theta, name=name: linkage.joint_angles(theta, [name])[name], *arc,
             linkage.is_angle(name)) for arc in reach] for name in others]))
-        for name, lows, highs in zip(others, *found[..., 0].transpose(2, 0, 1)):
+        for name, lows, highs in zip(others, *ranges[..., 0].transpose(2, 0, 1)):
             slack = SLACK if linkage.is_angle(name) else SLACK * float(linkage.longest)
             low, high = float(lows.min()) - slack, float(highs.max()) + slack
             if not linkage.is_angle(name) or -math.pi < low < high <= math.pi:

@@ -171,13 +171,13 @@ class Builder:
         shortest, longest = self._stroke(base, pivot, bar)
         word = called or self._numbered('cylinder')
         length = self.drive(Input(word, LENGTH, shortest, longest), geared)
-        found = planar.extended(self._plain_arm(base, pivot), length, bar, side, longest)
-        self.limits += found.limits
-        link = self._add_link(pivot, name, found.second, bar)
-        self._place(name, pivot, found.second, link, bar)
-        self.transmissions[name] = planar.transmission(found)
-        barrel = self._add_link(base, name, found.first, None, self._numbered('barrel'))
-        self._slide(word, barrel, base, name, length, found.first)
+        dyad = planar.extended(self._plain_arm(base, pivot), length, bar, side, longest)
+        self.limits += dyad.limits
+        link = self._add_link(pivot, name, dyad.second, bar)
+        self._place(name, pivot, dyad.second, link, bar)
+        self.transmissions[name] = planar.transmission(dyad)
+        barrel = self._add_link(base, name, dyad.first, None, self._numbered('barrel'))
+        self._slide(word, barrel, base, name, length, dyad.first)
         self.cylinders.append((base, name))
 
     def carriage(self, name: str, origin: str, towards: str, low: Real, high: Real,

@@ -402,11 +402,11 @@ def mirror(arm: Arm, image: Complex, offset: Real, ends: Sequence[Complex]) -> t
     """
     across, turning, bars = arm.across(offset), spin(arm.vector), []
     for bar in ends:
-        own = spin(bar)
+        bar_spin = spin(bar)
         bars.append(with_spin(bar + across, Rate(
-            (*turning.of, *own.of), lambda *rates, own=own: valid_where(
+            (*turning.of, *bar_spin.of), lambda *rates, bar_spin=bar_spin: valid_where(
                 2.0 * turning.formula(*rates[:len(turning.of)])
-                - own.formula(*rates[len(turning.of):]), abs(image.x + image.y)))))
+                - bar_spin.formula(*rates[len(turning.of):]), abs(image.x + image.y)))))
     return with_velocity(image, arm.foot, bars[0]), *bars
 
 

@@ -338,17 +338,17 @@ def two_rods(rods: Sequence[Rod], start: Sequence[Real]) -> tuple[Turn, Turn, Li
         pose, step = newton_step(bars, pose)
     final: list[Row] = []
 
-    def rates(*given: Real) -> tuple[Real, Real]:
+    def rates(*changes: Real) -> tuple[Real, Real]:
         if not final:
             pose = first.cosine, first.sine, second.cosine, second.sine
             final.extend(row(pivot, end, pose) for pivot, end, _ in bars)
         return _solution(final, [
             length * rate - each.rod.dot(Vector(*moving)) for each, (_, _, length), moving, rate
-            in zip(final, bars, (given[:3], given[4:7]), (given[3], given[7]))])
+            in zip(final, bars, (changes[:3], changes[4:7]), (changes[3], changes[7]))])
 
     of = tuple(x for pivot, _, length in bars for x in (*pivot, length))
     first, second = (turn_with_rate(s, c, c, s, Rate(
-        of, lambda *given, which=which: rates(*given)[which]))
+        of, lambda *changes, which=which: rates(*changes)[which]))
         for which, (c, s) in enumerate((pose[:2], pose[2:])))
     return first, second, Limit(with_rate(LAST_STEP - step, formula=lambda: real(0.0)), real(0.0))
 

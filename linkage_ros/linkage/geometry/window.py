@@ -147,7 +147,7 @@ class WindowRod(NamedTuple):
         moved, turn = (self.pivot.ahead(np.cos(motors.middle), np.sin(motors.middle)),
                        motors.half) if self.is_on_crank else (Vector(0.0, 0.0, 0.0), 0.0)
         rod, by_p, by_r = row(pivot, self.end, pose)
-        centre, end, ahead = (each.turned(*pose[:2]) for each in (
+        centre, end, ahead = (vector.turned(*pose[:2]) for vector in (
             self.end.centre, self.end.at(*pose[2:]), self.end.ahead(*pose[2:])))
         across = pivot.x * ahead.y - pivot.y * ahead.x
         # The derivatives of the gradient by the motor, and by both angles.
@@ -229,9 +229,10 @@ class Window:
         around = Boxes(0.5 * (one + other), boxes.half[:, None] + 0.5 * abs(one - other))
         with np.errstate(all='ignore'):
             ranges = [rod.ranges(boxes) for rod in self.rods]
-            shared = [rod.shared(each.some(first), each.some(second))
-                      for rod, each in zip(self.rods, ranges)]
-            right, left = (rod.directions(each, around) for rod, each in zip(self.rods, shared))
+            shared = [rod.shared(motors.some(first), motors.some(second))
+                      for rod, motors in zip(self.rods, ranges)]
+            right, left = (
+                rod.directions(motors, around) for rod, motors in zip(self.rods, shared))
             away = np.mod(right.middle - left.middle, math.pi)
             apart = np.minimum(away, math.pi - away) > right.half + left.half + SINGULAR
         return ~(apart | np.isnan(shared[0].half) | np.isnan(shared[1].half))
@@ -250,18 +251,18 @@ class Window:
         start, other = start[:, some], other[:, some]
         with np.errstate(all='ignore'):
             motors = [rod.motors(start) for rod in self.rods]
-            found = self._closed([rod.bar(each) for rod, each in zip(self.rods, motors)], other,
-                                 2 * STEPS)
-            again = [rod.motors(found) for rod in self.rods]
-            good = (found > self.low[:, None]) & (found < self.high[:, None])
-            good &= [abs(np.exp(1j * one) - np.exp(1j * two)) < CONVERGED if rod.is_on_crank
-                     else abs(one - two) < CONVERGED * two
-                     for rod, one, two in zip(self.rods, again, motors)]
-        apart = np.abs(found - start).max(axis=0) * good.all(axis=0)
+            solved = self._closed([rod.bar(motor) for rod, motor in zip(self.rods, motors)], other,
+                                  2 * STEPS)
+            again = [rod.motors(solved) for rod in self.rods]
+            good = (solved > self.low[:, None]) & (solved < self.high[:, None])
+            good &= [abs(np.exp(1j * reached) - np.exp(1j * motor)) < CONVERGED if rod.is_on_crank
+                     else abs(reached - motor) < CONVERGED * motor
+                     for rod, reached, motor in zip(self.rods, again, motors)]
+        apart = np.abs(solved - start).max(axis=0) * good.all(axis=0)
         if not (apart > DISTINCT).any():
             return None
         i = int(np.nanargmax(apart))
-        return (motors[0][i], motors[1][i]), (start[:, i], found[:, i])
+        return (motors[0][i], motors[1][i]), (start[:, i], solved[:, i])
 
     def _is_found(self) -> bool:
         """Return whether Newton's method finds the poses of a grid, from the middle."""
@@ -271,10 +272,10 @@ class Window:
             motors = np.array([rod.motors(poses) for rod in self.rods])
             there = ~np.isnan(motors).any(axis=0)
             poses, motors = poses[:, there], motors[:, there]
-            found = self._closed([rod.bar(each) for rod, each in zip(self.rods, motors)],
-                                 self.middle, STEPS - 1)
+            solved = self._closed([rod.bar(motor) for rod, motor in zip(self.rods, motors)],
+                                  self.middle, STEPS - 1)
         # A NaN fails this comparison.
-        return bool((np.abs(found - poses) < CONVERGED).all())
+        return bool((np.abs(solved - poses) < CONVERGED).all())
 
     @staticmethod
     def _closed(bars: Sequence[tuple[Vector, Circle, Any]], start: np.ndarray, steps: int

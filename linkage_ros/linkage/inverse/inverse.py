@@ -135,7 +135,7 @@ class Inverse:
         self.problem = InverseProblem(linkage, outputs)
         self._choice = Choice(self.problem)
         self.inputs = self.problem.inputs
-        self._is_part = any(each.is_part for each in self.inputs)
+        self._is_part = any(input_.is_part for input_ in self.inputs)
         if not self.is_quick:
             assert self._source  # raises ValueError for dependent outputs
 
@@ -444,8 +444,8 @@ class Inverse:
 def inverse_of(linkage: Kinematics, outputs: str | Sequence[str]) -> Inverse:
     """Implement `Mechanism.inverse`."""
     try:
-        found: Inverse = linkage.cache['inverse', outputs]
-        return found
+        inverse: Inverse = linkage.cache['inverse', outputs]
+        return inverse
     except (KeyError, TypeError):  # the first time, and for a list
         names = (outputs,) if isinstance(outputs, str) else outputs
     if not isinstance(names, (list, tuple)):

@@ -103,13 +103,13 @@ def _of_sketch(outputs: Names, sketch: _Sketch) -> InverseLinkage:
     if 2 ** len(branches) * math.prod(map(len, turns)) > MAX_MODES:
         raise ValueError(f'more than {MAX_MODES} assembly modes')
     design = Design('inverse', {}, tuple(line.text for line in lines), lines[-1].names[0])
-    given = [ratio * argument(outputs.index(name)) + offset
-             for name, ratio, offset in drives.values()]
+    values = [ratio * argument(outputs.index(name)) + offset
+              for name, ratio, offset in drives.values()]
     modes = {}
     for signs in product((1.0, -1.0), repeat=len(branches)):
         built = LinkageFormulas(design, dict(zip(branches, signs))).built
         modes[signs] = tuple(substituted([read.value(built) for read in sketch.reads],
-                                         dict(zip(built.arguments, given))))
+                                         dict(zip(built.arguments, values))))
     return InverseLinkage(design.joints, drives, tuple(branches), modes, turns)
 
 

@@ -76,8 +76,8 @@ class InverseProblem:
         self.inputs = tuple(map(self._with_period, range(self.n), linkage.inputs))
         self.turns = [input_.turn if input_.wraps else math.inf for input_ in self.inputs]
         # An output that is an input has its period.
-        own = {input_.name: turn for input_, turn in zip(self.inputs, self.turns)}
-        self.periods = [own.get(name, math.tau) if linkage.is_angle(name) else math.inf
+        turn_of = {input_.name: turn for input_, turn in zip(self.inputs, self.turns)}
+        self.periods = [turn_of.get(name, math.tau) if linkage.is_angle(name) else math.inf
                         for name in outputs]
 
     def _with_period(self, by: int, input_: Input) -> Input:

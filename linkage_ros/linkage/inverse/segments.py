@@ -69,8 +69,8 @@ class Segments:
         analysis, self._input = Analysis(linkage, others, first), first
         self._curve, arcs = analysis.curve('output', output), analysis.reach()
         self._ends = np.ravel(arcs)
-        is_angle, own = linkage.is_angle(output), first.turn if first.wraps else math.inf
-        self._period = (own if output == first.name else math.tau) if is_angle else math.inf
+        is_angle, turn = linkage.is_angle(output), first.turn if first.wraps else math.inf
+        self._period = (turn if output == first.name else math.tau) if is_angle else math.inf
         self._size = 1.0 if is_angle else linkage.longest
         self._rounding, self._unit = TOLERANCE * self._size, first.step
         normalized = first.normalized()
@@ -123,7 +123,7 @@ class Segments:
 
     def candidate_arrays(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return numbers of brackets of a value, of values (1, m) that have them, and brackets."""
-        found: list[tuple[np.ndarray, ...]] = []
+        parts: list[tuple[np.ndarray, ...]] = []
         period, none = self._period, np.empty(0, int)
         for *samples, sign in self._answers:
             theta, value = map(np.array, samples)
@@ -133,10 +133,10 @@ class Segments:
             while len(inside := np.flatnonzero((value[0] <= target) & (target <= value[-1]))):
                 goal = target[inside]
                 i = value[1:-1].searchsorted(goal, 'right')
-                found.append((np.full(len(i), len(found)), inside, np.stack([
+                parts.append((np.full(len(i), len(parts)), inside, np.stack([
                     theta[i], theta[i + 1], np.interp(goal, value, theta)])))
                 target = target + period
-        numbers, places, brackets = zip((none, none, np.empty((3, 0))), *found)
+        numbers, places, brackets = zip((none, none, np.empty((3, 0))), *parts)
         return np.concatenate(numbers), np.concatenate(places), np.hstack(brackets)
 
     def follow(self, value: float, residual: float, seed: float
@@ -242,10 +242,10 @@ class Segments:
             if not len(place) or len(theta) > most:
                 return theta, jumped
             new = (theta[place, None] + width[place, None] * CUTS).ravel()
-            found = self._curve(new)
+            new_value, new_rate = self._curve(new)
             order = np.argsort(np.concatenate([theta, new]))
             theta, value, rate = (np.concatenate(parts)[order] for parts in (
-                (theta, new), (value, found[0]), (rate, found[1])))
+                (theta, new), (value, new_value), (rate, new_rate)))
 
     def _moves(self, runs: Sequence[tuple]) -> bool:
         """Return whether the output differs from its median, over a tenth of the reach."""
@@ -264,12 +264,12 @@ class Segments:
             rising = rate[places] >= 0.0
             at, _ = refined(lambda x: (self._curve(x.ravel())[1] >= 0.0).reshape(
                 x.shape) == rising[:, None], theta[places], theta[places + 1])
-        found = self._curve(at)[0] if len(at) else at
+        extremes = self._curve(at)[0] if len(at) else at
         at[abs(at) < MIN_ANGLE] = 0.0
         # An extreme may be the one input at which an arm has no length and no direction.
-        found = value[places] + self._difference(
-            np.where(np.isfinite(found), found, value[places]) - value[places])
-        theta, value = np.insert(theta, places + 1, at), np.insert(value, places + 1, found)
+        extremes = value[places] + self._difference(
+            np.where(np.isfinite(extremes), extremes, value[places]) - value[places])
+        theta, value = np.insert(theta, places + 1, at), np.insert(value, places + 1, extremes)
         cuts = [0, *(places + 1 + np.arange(len(places))).tolist(), len(theta) - 1]
         for first, last in zip(cuts, cuts[1:]):
             part = slice(first, last + 1)

@@ -93,13 +93,13 @@ def turning_points(values: np.ndarray, rates: np.ndarray, least: float) -> np.nd
     by no more than `least` are rounding, and are omitted.
     """
     rising = np.asarray(rates) >= 0.0
-    found: list = []
+    places: list = []
     for i in np.flatnonzero(rising[1:] != rising[:-1]).tolist():
-        if found and abs(values[i] - values[found[-1]]) <= least:
-            found.pop()
+        if places and abs(values[i] - values[places[-1]]) <= least:
+            places.pop()
         else:
-            found.append(i)
-    return np.array(found, np.intp)
+            places.append(i)
+    return np.array(places, np.intp)
 
 
 def extremes(curve: Callable, lo: float, hi: float, is_angle: bool = False
@@ -115,7 +115,7 @@ def extremes(curve: Callable, lo: float, hi: float, is_angle: bool = False
     known = np.isfinite(value)
     if is_angle:
         value[known] = np.unwrap(value[known])
-    found = []
+    pairs = []
     for sign in (-1.0, 1.0):
         height = np.where(known, sign * value, -np.inf)
         beside = np.pad(height, 1, constant_values=-np.inf)
@@ -131,6 +131,6 @@ def extremes(curve: Callable, lo: float, hi: float, is_angle: bool = False
                             theta[(best + 1).clip(max=TURN_SAMPLES)])
         heights = np.append(sign * top[:, 0], -depth(refined_at[:, None])[:, 0])
         highest = np.where(np.isfinite(heights), heights, -np.inf).argmax()
-        found.append((float(sign * heights[highest]),
+        pairs.append((float(sign * heights[highest]),
                       float(np.append(theta[best], refined_at)[highest])))
-    return found
+    return pairs

@@ -128,13 +128,14 @@ def _touches(margins: Callable, theta: np.ndarray, values: np.ndarray) -> np.nda
     chosen = np.arange(len(row))
 
     def distance(angles: np.ndarray) -> np.ndarray:
-        found = margins(angles.ravel()).reshape(-1, *angles.shape)
-        return sign * found[row, chosen]
+        rows = margins(angles.ravel()).reshape(-1, *angles.shape)
+        return sign * rows[row, chosen]
 
     lo, hi = theta[place], theta[place + 2]
-    found = lowest(distance, lo, hi)[:, None]
+    nearest = lowest(distance, lo, hi)[:, None]
     steps = np.outer(hi - lo, 0.5 ** np.arange(1, HALVINGS))
-    return np.clip(np.hstack([found, found - steps, found + steps]).ravel(), theta[0], theta[-1])
+    return np.clip(
+        np.hstack([nearest, nearest - steps, nearest + steps]).ravel(), theta[0], theta[-1])
 
 
 def _trimmed(assembled: Callable, arcs: Sequence[Arc]) -> list[Arc]:
@@ -157,16 +158,16 @@ def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
     reached = [arc for arc in parts if bool(reachable(arc[0] + INSIDE * (arc[1] - arc[0])))]
     if reached == parts:
         return [(input_.low, input_.high)]
-    found: list[Arc] = []
+    merged: list[Arc] = []
     for lo, hi in reached:
-        if found and lo == found[-1][1]:
-            found[-1] = found[-1][0], hi
+        if merged and lo == merged[-1][1]:
+            merged[-1] = merged[-1][0], hi
         else:
-            found.append((lo, hi))
-    if input_.wraps and len(found) > 1 and found[0][0] + input_.turn == found[-1][1]:
-        found[-1] = found[-1][0], found.pop(0)[1] + input_.turn
+            merged.append((lo, hi))
+    if input_.wraps and len(merged) > 1 and merged[0][0] + input_.turn == merged[-1][1]:
+        merged[-1] = merged[-1][0], merged.pop(0)[1] + input_.turn
     return [(lo - input_.turn, hi - input_.turn) if input_.wraps and lo >= input_.high
-            else (lo, hi) for lo, hi in found]
+            else (lo, hi) for lo, hi in merged]
 
 
 def _crank_ends(limit: Limit, value: Callable) -> list[float]:

@@ -19,13 +19,13 @@ Ends = Sequence[tuple[float, float] | None] | None
 SHORTEST_LENGTH, LONGEST_LENGTH = 1e-30, 1e30
 
 
-def checked_dimensions(design: Design, given: Mapping[str, Any]) -> dict:
+def checked_dimensions(design: Design, values: Mapping[str, Any]) -> dict:
     """Return all dimensions of a design with defaults; raise ValueError if one is invalid."""
-    for name in given:
+    for name in values:
         if name not in design.dimensions:
             raise ValueError(f'{design.name} has no dimension {short_repr(name)}'
                              f'{suggestion(name, design.dimensions)}')
-    lengths = {name: _checked(design, name, given.get(name, default))
+    lengths = {name: _checked(design, name, values.get(name, default))
                for name, default in design.dimensions.items()}
     try:
         np.broadcast_shapes(*map(np.shape, lengths.values()))
@@ -66,28 +66,29 @@ NOT_NUMBERS = (str, bytes, bytearray, memoryview, type(None))
 def numbers(name: str, value: Any) -> np.ndarray:
     """Return a number or an array as float64; raise ValueError, with the name, if invalid."""
     try:
-        found = np.asarray(value)
-        kind = found.dtype.kind
+        array = np.asarray(value)
+        kind = array.dtype.kind
         if isinstance(value, NOT_NUMBERS) or kind not in 'fbiuO' or kind == 'O' and any(
-                isinstance(each, NOT_NUMBERS) for each in found.flat):
+                isinstance(item, NOT_NUMBERS) for item in array.flat):
             raise TypeError
-        return found.astype(float, copy=False)
+        return array.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError, RecursionError):
         raise ValueError(f'{name} must be a number or an array of numbers, '
                          f'got {short_repr(value)}') from None
 
 
-def checked_branches(design: Design, given: Mapping[str, int] | None, others: Any = None) -> dict:
+def checked_branches(
+        design: Design, branches: Mapping[str, int] | None, others: Any = None) -> dict:
     """
     Return all assembly signs of a design; raise ValueError if one is invalid.
 
     `others` are those that are not given, by default those of the design.
     """
-    if given is not None and not isinstance(given, Mapping):
+    if branches is not None and not isinstance(branches, Mapping):
         raise ValueError(f'{design.name}: branches must be a mapping from joint to +1 or -1, '
-                         f'got {short_repr(given)}')
+                         f'got {short_repr(branches)}')
     signs = dict(others or design.branches)
-    for name, sign in (given or {}).items():
+    for name, sign in (branches or {}).items():
         if name not in signs:
             raise ValueError(f'{design.name} has no branch {short_repr(name)}'
                              f'{suggestion(name, signs)}')

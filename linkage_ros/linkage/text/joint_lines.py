@@ -166,29 +166,29 @@ def _mirrored(lines: list[Line], mirror: Line) -> list[Line]:
 
     Lines placed from it alone have none.
     """
-    own = set(mirror.depends_on)
+    on_mirror = set(mirror.depends_on)
     count: dict[str, int] = {}
-    found = [mirror._replace(names=())]
+    images = [mirror._replace(names=())]
     for line in lines:
         count[line.word] = count.get(line.word, 0) + (not line.input_name)
-        if own >= {*line.names} or line.depends_on and own >= {*line.depends_on} \
+        if on_mirror >= {*line.names} or line.depends_on and on_mirror >= {*line.depends_on} \
                 and line.word in ('line', 'carriage'):
-            own |= {*line.names}
+            on_mirror |= {*line.names}
             continue
         if line.word == 'ground':
-            found.append(parsed(f'{line.names[0]}{mirror.names[0]} image {line.names[0]} '
-                                f'{" ".join(mirror.depends_on)}')._replace(text=mirror.text))
+            images.append(parsed(f'{line.names[0]}{mirror.names[0]} image {line.names[0]} '
+                                 f'{" ".join(mirror.depends_on)}')._replace(text=mirror.text))
             continue
-        args = [_image(line.word, arg, '' if arg.text in own else mirror.names[0])
+        args = [_image(line.word, arg, '' if arg.text in on_mirror else mirror.names[0])
                 for arg in line.arguments if arg.option not in ('geared', 'called')]
         if line.word in INPUTS:
             number = count[line.word] if count[line.word] > 1 else ''
             ratio = -1 if line.word == 'crank' else 1
             args += [f'geared {line.input_name or line.word + str(number)} {ratio} 0']
         names = [name + mirror.names[0] for name in line.names[::-1]]
-        found.append(parsed(f'{" ".join(names)} {line.word} {" ".join(args)}')._replace(
+        images.append(parsed(f'{" ".join(names)} {line.word} {" ".join(args)}')._replace(
             text=mirror.text, mirrors=(*line.mirrors, mirror.depends_on)))
-    return found
+    return images
 
 
 def _image(word: str, arg: Argument, suffix: str) -> str:
@@ -209,19 +209,19 @@ def parsed(text: str, forms: Mapping[str, tuple[str, ...]] = FORMS) -> Line:
     if len(text) > _LONGEST:
         raise _error(text, f'a line has up to {_LONGEST} letters, this has {len(text)}')
     parts = text.split()
-    found = [i for i, part in enumerate(parts) if part in forms and i > 0]
-    if not found:
+    indices = [i for i, part in enumerate(parts) if part in forms and i > 0]
+    if not indices:
         for part in parts[1:]:
             if near := did_you_mean(part, forms):
                 raise _error(text, f'unknown construction {short_repr(part)}{near}')
         raise _error(text, f'expected NAME and one of the constructions {", ".join(forms)}')
-    at = found[0]
+    at = indices[0]
     line = Line(text, tuple(parts[:at]), parts[at], tuple(parts[at + 1:]))
     names = 3 if line.word == 'inversor' else 1
     fitting = [arguments for form in forms[line.word]
                if (arguments := _matched(form, line.args)) is not None]
     if len(line.names) != names or not fitting:
-        words = [i for i in found if parts[i - 1] not in ('geared', 'called')]
+        words = [i for i in indices if parts[i - 1] not in ('geared', 'called')]
         several = '; one line per joint' if len(words) > 1 else ''
         expected = ' or '.join(f'"{"NAME " * names}{form}"' for form in forms[line.word])
         raise line.error(f'expected {expected}{several}')
@@ -252,15 +252,15 @@ def _matched(form: str, args: tuple[str, ...]) -> list[Argument] | None:
     if len(args) < len(kinds) or any(_is_literal(kind) and kind != arg
                                      for kind, arg in zip(kinds, args)):
         return None
-    found = [Argument(kind, arg) for kind, arg in zip(kinds, args) if not _is_literal(kind)]
+    arguments = [Argument(kind, arg) for kind, arg in zip(kinds, args) if not _is_literal(kind)]
     left = list(args[len(kinds):])
     for word, *kinds in map(str.split, options):
         if left[:1] == [word] and len(left) > len(kinds):
             # An option of one word is that word.
-            found += [Argument(kind, arg, word)
-                      for kind, arg in zip(kinds or [word], left[1:] if kinds else left)]
+            arguments += [Argument(kind, arg, word)
+                          for kind, arg in zip(kinds or [word], left[1:] if kinds else left)]
             del left[:1 + len(kinds)]
-    return None if left else found
+    return None if left else arguments
 
 
 def _is_literal(kind: str) -> bool:

@@ -212,17 +212,17 @@ class _LinkTree:
         unknown = {name for name, line in self.lines.items()
                    if line.word in _JOINTS and name not in self.inputs}
         left = [line for line in self.lines.values() if line.word in _RODS]
-        found: list[Group] = []
+        groups: list[Group] = []
         while left:
             open_ = [(line, tuple(x for x in self.between(*line.depends_on) if x in unknown))
                      for line in left]
             rods, links = self._next(open_)
-            found.append((rods, links))
+            groups.append((rods, links))
             unknown -= {*links}
             left = [line for line in left if line not in rods]
         for name in unknown:
             raise self.lines[name].error(f'no rod places {name}')
-        return found
+        return groups
 
     def _next(self, left: list[tuple[Line, tuple[str, ...]]]) -> Group:
         """Return the next group of rods, each given with the unplaced joints between its ends."""
