@@ -48,6 +48,11 @@ def short_repr(value: Any) -> str:
         return f'a {truncated(type(value).__name__, MAX_QUOTED - 2)}'
 
 
+def n_inputs(count: int) -> str:
+    """Return '1 input', '2 inputs' and so on."""
+    return f'{count} input' + 's' * (count != 1)
+
+
 def did_you_mean(word: Any, names: Iterable[str]) -> str:
     """Return a suggestion, to end a sentence, of the name most similar to a word; '' if none."""
     by_case = {name.lower(): name for name in names}

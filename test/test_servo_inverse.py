@@ -121,7 +121,7 @@ INPUTS_REFUSED = [
     ({'outputs': ['P.x']}, 'leg has 2 inputs: as many outputs are needed, not 1'),
     ({'outputs': ['P.x', 'P.x']},
      'P.x, P.x do not determine all inputs: too few of them move P.x, P.x'),
-    ({'mechanism': 'drop'}, 'drop has 1 inputs: as many outputs are needed, not 2')]
+    ({'mechanism': 'drop'}, 'drop has 1 input: as many outputs are needed, not 2')]
 
 
 def test_what_cannot_be_asked_of_several_inputs_gets_the_reason(graph):

@@ -20,7 +20,7 @@ from .names import comment, distinct, field, filled, prefix, template
 from .tables import Tables
 from ..linkage import Mechanism
 from ..scene import SceneMechanism
-from ..words import join_names, plain_text
+from ..words import join_names, n_inputs, plain_text
 
 # Poses of a solution of an inverse: the first, again with its rates, and after a step of Newton's
 # method. A sweep's end adds one to the answer's.
@@ -114,7 +114,7 @@ def _inverses(mechanism: SceneMechanism, texts: Sequence[str]) -> dict[str, list
     for output in outputs:
         mechanism.linkage.check_output(output)
     if outputs and n > 1 and len(outputs) != n:
-        raise ValueError(f'{mechanism.name} has {n} inputs: as many outputs are needed, '
+        raise ValueError(f'{mechanism.name} has {n_inputs(n)}: as many outputs are needed, '
                          f'got {join_names(outputs)}')
     groups = [invertible(mechanism, [axis(mechanism, output, output)
                                      for output in outputs[i:i + n]])

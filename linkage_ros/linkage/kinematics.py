@@ -27,7 +27,7 @@ from ..formula.expression import derivative, Real, real
 from ..formula.namespace import array_function
 from ..formula.program import CompiledFunction, evaluate, evaluate_in_order, Program
 from ..optional import needs
-from ..words import did_you_mean, join_names, plain_text, short_repr, suggestion
+from ..words import did_you_mean, join_names, n_inputs, plain_text, short_repr, suggestion
 
 # Quantities of joints; all others are of links.
 OF_POINTS = 'points', 'velocities', 'point accelerations'
@@ -476,7 +476,7 @@ class Kinematics:
         if len(self.inputs) == 1:
             return (numbers(name, theta),)
         if not hasattr(theta, '__len__') or len(theta) != len(self.inputs):
-            raise ValueError(f'{self.type} has {len(self.inputs)} inputs: '
+            raise ValueError(f'{self.type} has {n_inputs(len(self.inputs))}: '
                              f'{name} must be a sequence of as many values')
         return [numbers(name, each) for each in theta]
 

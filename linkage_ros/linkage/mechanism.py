@@ -18,7 +18,7 @@ from .kinematics import Inputs, Kinematics
 from .motion.reach import extremes_of, reach_of
 from .motion.singularities import Analysis
 from .text.arguments import numbers
-from ..words import short_repr
+from ..words import n_inputs, short_repr
 
 
 class Mechanism(Kinematics):
@@ -130,7 +130,7 @@ class Mechanism(Kinematics):
                              'not for arrays')
         values = numbers('others', others)
         if values.shape != (len(self.inputs) - 1,):
-            raise ValueError(f'{self.type} has {len(self.inputs)} inputs: the values of all '
+            raise ValueError(f'{self.type} has {n_inputs(len(self.inputs))}: the values of all '
                              f'except the first are needed, got {short_repr(values.tolist())}')
         return tuple(values.tolist())
 

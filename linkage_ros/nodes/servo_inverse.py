@@ -20,7 +20,7 @@ from ..cache import Cache
 from ..optional import needs
 from ..robot_model import bodies
 from ..scene.inverse_request import InverseRequest, LEVER, present_inputs
-from ..words import join_names, MESSAGE, short_repr, suggestion, truncated
+from ..words import join_names, MESSAGE, n_inputs, short_repr, suggestion, truncated
 
 # Other callers and messages wait for an answer: the maximum number of values in a request.
 MAX_VALUES = 10_000
@@ -144,7 +144,7 @@ def solve_inputs_for(mechanism: scene.SceneMechanism, request: Any, response: An
     """Answer a request for several outputs; raise ValueError if it cannot be answered."""
     values, near, n = request.values, request.near, len(mechanism.inputs)
     if len(request.outputs) != n:
-        raise ValueError(f'{mechanism.name} has {n} inputs: as many outputs are needed, not '
+        raise ValueError(f'{mechanism.name} has {n_inputs(n)}: as many outputs are needed, not '
                          f'{len(request.outputs)}')
     inverse = InverseRequest(mechanism, request.outputs)
     if len(values) != n or len(near) not in (0, n):

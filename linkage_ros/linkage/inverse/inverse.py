@@ -34,7 +34,7 @@ from ..text.arguments import checked_ends, Ends, numbers
 from ..tolerances import SINGULAR
 from ...formula.namespace import array_function
 from ...formula.program import FEW_POSES
-from ...words import join_names, plain_text, short_repr
+from ...words import join_names, n_inputs, plain_text, short_repr
 
 
 class Solution(NamedTuple):
@@ -128,8 +128,8 @@ class Inverse:
     def __init__(self, linkage: Kinematics, outputs: tuple[str, ...]):
         self.linkage, self.outputs, self._n = linkage, outputs, len(outputs)
         if len(outputs) != len(linkage.inputs):
-            raise ValueError(f'{linkage.type} has {len(linkage.inputs)} inputs: as many outputs '
-                             f'are needed, got {join_names(outputs)}')
+            raise ValueError(f'{linkage.type} has {n_inputs(len(linkage.inputs))}: as many '
+                             f'outputs are needed, got {join_names(outputs)}')
         if self._n == 1:
             linkage.check_output(outputs[0])
         self.problem = InverseProblem(linkage, outputs)
@@ -299,7 +299,7 @@ class Inverse:
         return tuple([x if type(x) is float or x.ndim else x.item() for x in parts])
 
     def _miscounted(self, values: Any, name: str) -> ValueError:
-        return ValueError(f'{self.linkage.type} has {self._n} inputs: {name} must be as many '
+        return ValueError(f'{self.linkage.type} has {n_inputs(self._n)}: {name} must be as many '
                           f'numbers, got {short_repr(values)}')
 
     # --- one of the solutions ---

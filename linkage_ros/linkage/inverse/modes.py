@@ -60,8 +60,7 @@ def modes_of(problem: InverseProblem, closed: InverseLinkage | None) -> list[tup
     Beside them are the rates of each output by the first input, by the second and so on.
     """
     if not closed:
-        raise ValueError(
-            f'from {join_names(problem.outputs)} there is no closed form, only a search')
+        raise ValueError(f'{join_names(problem.outputs)}: no closed form is known, only a search')
     modes, forward = [], problem.linkage.structure.checked(problem.outputs)
     for inputs in closed.solutions():
         results = substituted(forward, dict(enumerate(inputs)))
