@@ -11,7 +11,7 @@ from ..linkage import GROUND, Link, loaded_links
 from ..scene import SceneMechanism
 from ..scene.joint_names import JointName
 from ..scene.motion import Motion
-from ..words import join_names
+from ..words import join_names, n_inputs
 
 
 class Axis(NamedTuple):
@@ -77,7 +77,7 @@ def joints(mechanism: SceneMechanism, names: Sequence[str] = ()) -> list[Axis]:
     outputs = [named[0] for name in names if (named := mechanism.output_named(name))
                ] if names else _chain(mechanism)
     if len({*outputs}) != len(mechanism.inputs):
-        raise ValueError(f'{mechanism.name} has {len(mechanism.inputs)} inputs: as many of its '
+        raise ValueError(f'{mechanism.name} has {n_inputs(len(mechanism.inputs))}: as many of its '
                          f'joints are needed, not {join_names(names)}')
     return invertible(mechanism, [_joint(mechanism, output) for output in outputs])
 

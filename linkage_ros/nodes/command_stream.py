@@ -21,7 +21,7 @@ from .publishers import TrackedPublisher
 from ..scene.inverse_request import ActuatorCommand, InverseRequest
 from ..scene.joint_names import JointName
 from ..scene.scene_mechanism import SceneMechanism
-from ..words import join_names, truncated
+from ..words import join_names, n_inputs, truncated
 
 # Maximum number of points of a trajectory, which take the worker some seconds.
 MAX_POINTS = 10_000
@@ -141,7 +141,7 @@ class CommandStream:
             n, called = len(mechanism.inputs), ' and '.join(truncated(names[i]) for i in indices)
             try:
                 if len(outputs) != n:
-                    raise ValueError(f'{name} has {n} inputs: name {n} of its outputs, not '
+                    raise ValueError(f'{name} has {n_inputs(n)}: name {n} of its outputs, not '
                                      f'{called}')
                 target = Target(called, mechanism, InverseRequest(mechanism, joints), indices,
                                 published)

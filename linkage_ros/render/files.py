@@ -18,7 +18,7 @@ from ..words import RequestError
 
 PALETTE_FRAMES = 8
 # How long a GIF shows a picture at most [ms]: Pillow makes one of equal ones.
-LONGEST = 655350
+MAX_GIF_MS = 655350
 # Pillow looks colours up in a palette by their upper six bits: white would become another grey.
 SIX_BITS = 0b11111100
 
@@ -74,7 +74,7 @@ def gif(picture, times, fps, loop, colours, file: Path):
         frames.append(frame)
     # A GIF counts hundredths of a second, Pillow milliseconds.
     ends = [10 * round(100.0 * k / fps) for k in range(len(frames) + 1)]
-    if ends[-1] > LONGEST:
+    if ends[-1] > MAX_GIF_MS:
         raise RequestError('a .gif lasts 655 s at most: choose a higher --fps, or .mp4')
     repeats = {} if loop == 1 else {'loop': max(loop - 1, 0)}
     with replacing(file) as new:

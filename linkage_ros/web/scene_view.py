@@ -45,7 +45,7 @@ MAX_ANNOUNCE_S, MAX_ANSWER_S, RETRY_S = 1.0, 3.0, 0.005
 # Downloads, the last two of linkages in a plane only; the page itself draws 'png'.
 FORMS = 'yaml', 'png', 'h', 'csv', 'urdf'
 
-Reply = dict[str, Any]
+JsonObject = dict[str, Any]
 
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 
@@ -121,7 +121,7 @@ class SceneView:
         self.clients.remove(client)
         self._news.set()
 
-    async def set(self, key: str, values: Mapping[str, Any]) -> Reply:
+    async def set(self, key: str, values: Mapping[str, Any]) -> JsonObject:
         """
         Set parameters of a mechanism, those of one node all or none.
 
@@ -147,7 +147,7 @@ class SceneView:
         return {}
 
     async def pose(self, key: str, want: Mapping[str, Any] | None = None,
-                   arrows: str = '') -> Reply:
+                   arrows: str = '') -> JsonObject:
         """
         Describe a mechanism's pose; with a request, move it there first and hold it.
 
@@ -180,15 +180,15 @@ class SceneView:
             values[f'{name}.speed'] = 0.0
         await self.set(shown.key, values)
 
-    async def tune(self, key: str) -> Reply:
+    async def tune(self, key: str) -> JsonObject:
         """Return the result of `poses.tunable`."""
         return await asyncio.to_thread(poses.tunable, self._mechanism(self._find(key)))
 
-    async def curve(self, key: str, **about: Any) -> Reply:
+    async def curve(self, key: str, **about: Any) -> JsonObject:
         """Return the result of `curves.curve`."""
         return await asyncio.to_thread(curves.curve, *self._state(self._find(key)), **about)
 
-    async def export(self, key: str, form: str) -> Reply:
+    async def export(self, key: str, form: str) -> JsonObject:
         """Return a file's text: 'yaml', the scene; 'csv', all outputs; 'urdf'; or 'h', of C."""
         shown = self._find(key)
         mechanism = self._mechanism(shown)
@@ -206,7 +206,7 @@ class SceneView:
         speeds = {name: speed for name, speed in self._speeds[owner].items() if name in names}
         return writing.in_yaml(writing.without_defaults(scene.changed(whole, speeds)))
 
-    async def read(self, text: str) -> Reply:
+    async def read(self, text: str) -> JsonObject:
         """Return the result of `poses.number`."""
         return poses.number(str(text))
 
@@ -266,7 +266,7 @@ class SceneView:
                 for parameter in self._mechanism(shown).parameters
                 if parameter.name in shown.nodes}
 
-    def _described(self, shown: ShownMechanism) -> Reply:
+    def _described(self, shown: ShownMechanism) -> JsonObject:
         """Describe what the page needs of a mechanism beside its markers."""
         mechanism = self._mechanism(shown)
         forms, kinds = (FORMS[:3], {}) if mechanism.in_space else (FORMS, curves.KINDS)

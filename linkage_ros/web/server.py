@@ -20,7 +20,7 @@ from typing import Any, Callable
 from aiohttp import web, WSCloseCode, WSMsgType
 
 from .feed import Feed
-from .scene_view import Reply, SceneView
+from .scene_view import JsonObject, SceneView
 from .. import palette
 from ..words import MESSAGE, short_repr, truncated
 
@@ -174,13 +174,13 @@ class Client:
 
     def __init__(self, view: SceneView, socket_: web.WebSocketResponse) -> None:
         self._view, self._socket = view, socket_
-        self._texts: dict[Any, Reply] = {}
+        self._texts: dict[Any, JsonObject] = {}
         self._offered: set[Feed] = set()
         self._ready = True
         self._news = asyncio.Event()
         self._requests: asyncio.Queue[str] = asyncio.Queue(MAX_WAITING)
 
-    def tell(self, key: Any, message: Reply) -> None:
+    def tell(self, key: Any, message: JsonObject) -> None:
         """Send a message; it replaces a waiting one with the same key."""
         self._texts.pop(key, None)
         self._texts[key] = message
@@ -263,7 +263,7 @@ class Client:
                     self._ready = False
                     await asyncio.wait_for(self._socket.send_bytes(picture), MAX_READ_S)
 
-    async def _send_message(self, message: Reply) -> None:
+    async def _send_message(self, message: JsonObject) -> None:
         await asyncio.wait_for(self._socket.send_json(message), MAX_READ_S)
 
 

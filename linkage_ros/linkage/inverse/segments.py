@@ -172,7 +172,7 @@ class Segments:
                 float(here.theta[end] - there.theta[-1 - end]) * self._unit)
         return None
 
-    # --- for another use ---
+    # --- monotone pieces ---
 
     def pieces(self) -> np.ndarray:
         """Return pieces of the segments: two inputs, and two outputs within half a period."""
