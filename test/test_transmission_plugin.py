@@ -71,8 +71,8 @@ class Plugins:
                 (folder / name / path).write_text(text, encoding='utf-8')
             if not library.exists():
                 subprocess.run([
-                    compiler, *PLUGIN, *flags, '-shared', '-fPIC', '-I', folder / name / 'include',
-                    folder / name / 'src' / 'plugins.cpp', '-o', library, *ROS, *more], check=True)
+                    compiler, *PLUGIN, *flags, '-shared', '-fPIC',
+                    folder / name / 'src' / 'plugins.cpp', '-o', library, *more], check=True)
             self.mechanisms.update(mechanisms)
             self.libraries.update(dict.fromkeys(mechanisms, (library, f'{name}_plugins')))
             self.host = self.host or ctypes.CDLL(str(library))

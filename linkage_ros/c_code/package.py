@@ -48,7 +48,6 @@ def package(name: str, scene: str, mechanisms: Sequence[tuple[SceneMechanism, Se
         parts.append(_parts(name, type_, mechanism, commanded, others))
     values = {
         'package': name, 'namespace': f'{name}_plugins', 'scene': escape(comment(scene)),
-        'passive': max(len(request.passive) for request in requests),
         **{key: '\n'.join(part[key] for part in parts) for key in parts[0]}}
     headers = header.headers(requests, False, ['#include "linkage.h"'] * len(requests))
     return {
@@ -56,9 +55,8 @@ def package(name: str, scene: str, mechanisms: Sequence[tuple[SceneMechanism, Se
            for request, text in zip(requests, headers)},
         Path('src/linkage.h'): template('linkage.h'),
         **{path: filled(template(path.name), values) for path in map(Path, (
-            'CMakeLists.txt', 'package.xml', 'README.md', 'plugins.xml', 'src/plugins.cpp',
-            'src/transmission.hpp', 'urdf/transmissions.xml',
-            'include/linkage_ros/linkage_transmission.hpp'))}}
+            'CMakeLists.txt', 'package.xml', 'plugins.xml', 'src/plugins.cpp',
+            'urdf/transmissions.xml'))}}
 
 
 def _parts(package_name: str, type_: str, mechanism: SceneMechanism, commanded: Sequence[Axis],
@@ -73,7 +71,6 @@ def _parts(package_name: str, type_: str, mechanism: SceneMechanism, commanded: 
     described = [f'  <{kind} name={quoteattr(axis.name)} role={quoteattr(axis.role)}/>'
                  for kind, axes in zip(('actuator', 'joint'), sides) for axis in axes]
     return {
-        'rows': f'| `{plugin}` | {first} | {second} |',
         'includes': f'#include "{name}_linkage.h"',
         'linkages': f'const Linkage {name}_linkage{{{name}_model, {{{rows(sides[0])}}}, '
                     f'{{{rows([*commanded, *others])}}}}};\n'

@@ -51,59 +51,59 @@ class Tables:
     def __init__(self, mechanism: SceneMechanism, code: Code, formulas: Formulas):
         self.mechanism, self.linkage, self._code, self._formulas = (
             mechanism, mechanism.linkage, code, formulas)
-        self.solutions: dict[tuple, tuple[str, int, str]] = {}
+        self.solutions: dict[tuple[str, ...], tuple[str, int, str]] = {}
 
-    def text(self, sides: tuple[Sequence[Axis], Sequence[Axis]], tag: str = '',
+    def text(self, name: str, about: str, sides: tuple[Sequence[Axis], Sequence[Axis]],
              passive: Sequence[Axis] = ()) -> str:
         """
-        Return the function for a pose, and the table.
+        Return the function for a pose, and the table of a name, with a line about it.
 
-        `sides` are the actuators and the commanded joints; an inverse alone has no actuators, and
-        a `tag` at the end of its names. `passive` are joints that are not commanded.
+        `sides` are the actuators and the commanded joints; an inverse alone has no actuators.
+        `passive` are joints that are not commanded.
         """
-        row, rows = self._code.row, (sides[0], [*sides[1], *passive])
+        row, rows, n = self._code.row, (sides[0], [*sides[1], *passive]), len(sides[1])
+        solutions = ', '.join(map(self._solutions, sides))
         return filled(template('model.h.in'), {
-            **self._formulas.names, 'tag': tag,
-            'about': 'the inverse' if tag else 'the actuators and joints',
-            'n': len(self.mechanism.scales), 'counts': ', '.join(str(len(axes)) for axes in rows),
-            'names': ', '.join(map(self._solutions, sides)),
-            'at': indented(self._at(rows, len(sides[1]))),
-            'axes': row(row((1.0 / axis.size, axis.turn or math.inf)
-                            for axis in axes) if axes else '{ { 0, 0 } }'
+            'name': self.mechanism.name, 'model': name, 'about': comment(about), 'n': n,
+            'counts': ', '.join(str(len(axes)) for axes in rows), 'solutions': solutions,
+            'inputs': ', '.join(f'p->q[{i}]' for i in range(n)),
+            'values': indented(self._values(rows)),
+            'sum': ' + '.join(f'p->position[{side}][{i}]' for side, axes in enumerate(sides)
+                              for i in range(len(axes))),
+            'axes': row(row((axis.factor, axis.offset, 1.0 / axis.size, axis.turn or math.inf)
+                            for axis in axes) if axes else '{ { 0, 0, 0, 0 } }'
                            for axes in rows),
-            'inputs': row(self._inputs(sides, has_sweeps=not tag)),
+            'rows': row(self._inputs(sides)),
             'start': row(start(self.mechanism))})
 
-    def _at(self, sides: tuple[Sequence[Axis], Sequence[Axis]], commanded: int) -> Iterator[str]:
-        """Yield the statements for values, rates by each input, and loads."""
-        code, formulas, scale_of = self._code, self._formulas, self.mechanism.scale_of
-        needed = []
+    def _values(self, sides: Sequence[Sequence[Axis]]) -> Iterator[str]:
+        """Yield the statements for positions, rates by each input, and loads."""
+        code, fields, scale_of = self._code, self._formulas.fields, self.mechanism.scale_of
+        inputs = range(len(self.mechanism.scales))
         for side, axes in enumerate(sides):
             for i, axis in enumerate(axes):
-                field, factor = formulas.fields[axis.output], axis.factor / scale_of(axis.output)
-                position, *rates = [code.times(f'{struct}.{field}', factor)
-                                    for struct in ('s', *formulas.by)]
+                field, factor = fields[axis.output], axis.factor / scale_of(axis.output)
+                position = code.times(f's.{field}', factor)
                 if axis.offset:
                     position += f' + {code.literal(axis.offset)}'
                 if axis.wraps:
                     position = f'lkr_wrapped({position}, {code.literal(axis.turn)})'
                 yield f'p->position[{side}][{i}] = {position};'
-                yield from (f'p->rate[{side}][{i}][{j}] = {rate};' for j, rate in enumerate(rates))
-                needed += [f'p->position[{side}][{i}]'] * (i < commanded)
+                for j in inputs:
+                    yield f'p->rate[{side}][{i}][{j}] = {code.times(f"by[{j}].{field}", factor)};'
         # An inverse alone needs no efforts.
-        for j, by in enumerate(formulas.by if sides[0] else ()):
-            terms = [code.times(f'{by}.{formulas.fields[output]}', -load / scale_of(output))
+        for j in inputs if sides[0] else ():
+            terms = [code.times(f'by[{j}].{fields[output]}', -load / scale_of(output))
                      for output, load in loads(self.mechanism)]
             yield f'p->load[{j}] = {" + ".join(terms) or code.literal(0.0)};'
-        yield f'return isfinite({" + ".join(needed)});'
 
     # --- tables ---
 
-    def _inputs(self, sides: Sequence[Sequence[Axis]], has_sweeps: bool) -> Iterator[tuple]:
+    def _inputs(self, sides: Sequence[Sequence[Axis]]) -> Iterator[tuple]:
         """Yield the rows of the inputs, as `lkr_input` has them."""
         counted = [{axis.input for axis in axes} for axes in sides]
         for i, settings in enumerate(self.mechanism.inputs.values()):
-            input_, sweep = self.linkage.inputs[i], has_sweeps and settings.ends
+            input_, sweep = self.linkage.inputs[i], sides[0] and settings.ends
             turns = [input_.turn if input_.wraps and i not in inputs else math.inf
                      for inputs in counted]
             size = self.mechanism.scales[i] * input_.size
@@ -116,9 +116,7 @@ class Tables:
         outputs = tuple(axis.output for axis in axes)
         if not axes:
             return '0'
-        # Axes of the same outputs may have other signs and offsets.
-        key = tuple((axis.output, axis.factor, axis.offset) for axis in axes)
-        if key not in self.solutions:
+        if outputs not in self.solutions:
             name = '_'.join([f'{self.mechanism.name}_solutions', *(
                 self._formulas.fields[output] for output in outputs)])
             *_, name = distinct([*(known for known, *_ in self.solutions.values()), name])
@@ -131,31 +129,24 @@ class Tables:
                 generated = self._closed(name, axes, counted, closed)
             else:
                 generated = self._series(name, *axes)
-            self.solutions[key] = name, *generated
-        return self.solutions[key][0]
-
-    def _value(self, i: int, axis: Axis) -> str:
-        """Return the output, in its own units, of an axis at position i."""
-        code, literal = f'position[{i}]', self._code.literal
-        if axis.offset:
-            code = f'({code} - {literal(axis.offset)})'
-        return code if axis.factor == 1.0 else f'{code} / {literal(axis.factor)}'
+            self.solutions[outputs] = name, *generated
+        return self.solutions[outputs][0]
 
     def _series(self, name: str, axis: Axis) -> tuple[int, str]:
         """Return the most inputs of an output, and the function for them by series."""
         code, monotone = self._code, self.linkage.monotone(axis.output)
         pieces = series(self.linkage, axis.output, monotone, code.single, *self.mechanism.scales)
         rows = [f'    {code.row([*row[:7], row[7:]])},' for row in pieces.tolist()]
-        arguments = ', '.join([*(code.literal(value / abs(axis.factor)) for value in (
-            axis.size, axis.turn or math.inf)), self._value(0, axis)])
+        turns = self.linkage.is_angle(axis.output)
+        size, turn = (1.0, math.tau) if turns else (self.linkage.longest, math.inf)
         # Where two pieces of a monotone part meet, both have the input.
         return min(len(rows), 2 * len(monotone)), '\n'.join([
             f'/* The inputs of an output, in each of {len(rows)} pieces of the reach. */',
-            f'static inline int {name}(const {code.number} *position,',
+            f'static inline int {name}(const {code.number} *value,',
             f'    {code.number} (*q)[LKR_MAX_INPUTS])', '{',
             f'    static const lkr_piece piece[{len(rows)}] LKR_IN_FLASH = {{',
             indented(rows), '    };',
-            f'    return lkr_series({len(rows)}, piece, {arguments}, q);', '}'])
+            f'    return lkr_series({len(rows)}, piece, {code.literal(size)}, {code.literal(turn)}, *value, q);', '}'])
 
     def _closed(self, name: str, axes: Sequence[Axis], counted: Mapping[int, Real],
                 closed: InverseLinkage) -> tuple[int, str]:
@@ -182,9 +173,9 @@ class Tables:
         """Return the number of solutions, each a line above it and inputs, and the function."""
         number, scales = self._code.number, self.mechanism.scales
         return len(solutions), self._code.function(
-            f'/* {about} */\nstatic inline int {name}(const {number} *position,\n'
+            f'/* {about} */\nstatic inline int {name}(const {number} *value,\n'
             f'    {number} (*q)[LKR_MAX_INPUTS])',
-            [self._value(i, each) for i, each in enumerate(axes)],
+            [f'value[{i}]' for i in range(len(self.mechanism.scales))],
             [(above, {f'q[{k}][{i}]': value * scales[i] for i, value in inputs.items()})
              for k, (above, inputs) in enumerate(solutions)],
             f'return {len(solutions)};')
