@@ -373,29 +373,15 @@ def test_a_package_is_built_and_installed(tmp_path):
     if not (Path(sys.prefix) / 'share' / 'ament_cmake').is_dir():
         pytest.skip('ament_cmake is not installed')
     package = written(tmp_path, ROOT / 'examples' / 'leg.yaml', '--mechanism', 'knee', 'hip')
-    installed, component = tmp_path / 'install', tmp_path / 'component'
-
-    def built(source, folder, *more):
-        for command in (['-S', source, '-B', folder, f'-DPython3_EXECUTABLE={sys.executable}',
-                         f'-DCMAKE_INSTALL_PREFIX={installed}',
-                         f'-DCMAKE_PREFIX_PATH={installed};{STAND_IN / "cmake"};{sys.prefix}'],
-                        ['--build', folder, *more]):
-            ended = subprocess.run(['cmake', *command], capture_output=True, text=True)
-            assert ended.returncode == 0, ended.stdout + ended.stderr
-
-    built(package, tmp_path / 'build', '--target', 'install')
+    installed = tmp_path / 'install'
+    for command in (['-S', package, '-B', tmp_path / 'build',
+                     f'-DPython3_EXECUTABLE={sys.executable}',
+                     f'-DCMAKE_INSTALL_PREFIX={installed}',
+                     f'-DCMAKE_PREFIX_PATH={STAND_IN / "cmake"};{sys.prefix}'],
+                    ['--build', tmp_path / 'build', '--target', 'install']):
+        ended = subprocess.run(['cmake', *command], capture_output=True, text=True)
+        assert ended.returncode == 0, ended.stdout + ended.stderr
     assert (installed / 'lib' / 'libleg_transmissions.so').is_file()
-    # A hardware component finds the header of the status.
-    component.mkdir()
-    (component / 'CMakeLists.txt').write_text(f"""
-cmake_minimum_required(VERSION 3.16)
-project(component LANGUAGES CXX)
-set(CMAKE_CXX_STANDARD 17)
-find_package(leg_transmissions REQUIRED)
-add_library(component SHARED {STAND_IN / 'component.cpp'})
-target_link_libraries(component leg_transmissions::status)
-""")
-    built(component, tmp_path / 'other')
 
 
 # The actuators and joints of some mechanisms: names, and roles.
@@ -416,7 +402,6 @@ def test_a_package_names_what_the_scene_names(mechanisms):
     assert 'Linkages of a<b>* /.yaml as' in described.findtext('description')
     assert {each.text for each in described.iter('depend')} == set(re.findall(
         r'find_package\((?!ament)(\w+)', files['CMakeLists.txt']))
-    assert '| `robot_1/Int` | a* / "b"/ ? ?/?%s ? | while/1:x |' in files['README.md']
     assert [(own.get('name'), own.findtext('plugin'), *({
         each.get('name'): each.get('role') for each in own.iter(side)}
         for side in ('actuator', 'joint'))) for own in pasted] == [
@@ -503,6 +488,6 @@ def test_a_package_is_written_again(tmp_path, capsys):
         for mechanism in [scene.load(path).mechanisms[name]]])
     for _ in range(2):
         made = written(tmp_path, path, '--mechanism', *chosen, '--joints', 'knee')
-        assert capsys.readouterr().out == f'{made}: knee, hip; see README.md\n'
+        assert capsys.readouterr().out == f'{made}: knee, hip; see urdf/transmissions.xml\n'
         assert {file.relative_to(made): file.read_text() for file in made.rglob('*')
                 if file.is_file()} == files

@@ -49,7 +49,7 @@ def write_package(folder: str, scene_file: str,
     for path, text in package(out.name, scene_file, mechanisms).items():
         (out / path).parent.mkdir(parents=True, exist_ok=True)
         (out / path).write_text(text, encoding='utf-8')
-    print(f'{out}: {", ".join(mechanism.name for mechanism, _ in mechanisms)}; see README.md')
+    print(f'{out}: {", ".join(mechanism.name for mechanism, _ in mechanisms)}; see urdf/transmissions.xml')
 
 
 def is_ours(folder: Path) -> bool:
