@@ -99,7 +99,8 @@ def _values(request: Request, single: bool) -> dict[str, Any]:
     about = [*_about(mechanism), f'A call takes at most {POSES * max(counts) + 1} poses.']
     return {
         'about': '\n'.join(f' * {line}' for line in about),
-        'name': name, 'N': prefix(name), 'float': int(single), 'own_inputs': len(linkage.inputs),
+        'name': name, 'N': prefix(name), 'float': int(single),
+        'number': code.number, 'suffix': '##f' if single else '', 'own_inputs': len(linkage.inputs),
         'own_joints': len(sides[1]) + len(request.passive), 'own_solutions': max(counts),
         'fields': formulas.struct(), 'pose': formulas.function(),
         'enums': '\n'.join(_enum(f'{prefix(name)}_{side}', axes) for side, axes in zip(

@@ -16,16 +16,8 @@
 #include <math.h>
 #include <string.h>
 
-#if LKR_FLOAT
-typedef float lkr_real;
-#define LKR_MATH(name) name##f
-#define LKR_OF(in_double, in_float) in_float
-#elif DBL_MANT_DIG < 53
+#if DBL_MANT_DIG < 53 && LKR_OF(1, 0)
 #error "double is a float on this machine: print the header again with --float"
-#else
-typedef double lkr_real;
-#define LKR_MATH(name) name
-#define LKR_OF(in_double, in_float) in_double
 #endif
 
 /* A Jacobian below this part of its size is singular. */
@@ -122,11 +114,8 @@ static inline int lkr_copy(int n, const lkr_real *from, lkr_real *to)
     int are_finite = 1;
     int i;
     for (i = 0; i < n; i++) {
-        if (isfinite(from[i])) {
-            to[i] = from[i];
-        } else {
-            are_finite = 0;
-        }
+        to[i] = isfinite(from[i]) ? from[i] : to[i];
+        are_finite = are_finite && isfinite(from[i]);
     }
     return are_finite;
 }
@@ -364,21 +353,15 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
         for (i = 0; i < model->inputs; i++) {
             p->q[i] += step[i];
         }
-        if (!model->at(has_rates, p)) {
-            return 0;
-        }
-        left = lkr_gap(model, side, position, p, step);
+        left = model->at(has_rates, p) ? lkr_gap(model, side, position, p, step) : INFINITY;
         if (left <= LKR_ENOUGH) {
             return poses;
         }
-        if (!(left < LKR_OTHER) || (!has_rates && !model->at(1, p))) {
-            return 0;
-        }
-        has_rates = 1;
+        has_rates = has_rates || model->at(1, p);
         if (lkr_is_rounding(model, side, position, p, left)) {
             return poses;
         }
-        if (!lkr_solve(model, side, p, 0, step)) {
+        if (!(left < LKR_OTHER) || !lkr_solve(model, side, p, 0, step)) {
             return 0;
         }
     }
@@ -473,7 +456,7 @@ static inline int lkr_velocities(const lkr_model *model, const lkr_point *p, int
     const lkr_real *velocity, lkr_real *other)
 {
     lkr_real speed[LKR_MAX_INPUTS] = { 0 };
-    int is_finite = 1;
+    lkr_real sum[LKR_MAX_JOINTS] = { 0 };
     int i, j;
     if (!lkr_copy(model->inputs, velocity, speed)) {
         return LKR_NOT_KNOWN;
@@ -482,13 +465,12 @@ static inline int lkr_velocities(const lkr_model *model, const lkr_point *p, int
         return LKR_SINGULAR;
     }
     for (i = 0; i < model->count[1 - side]; i++) {
-        lkr_real sum = 0;
         for (j = 0; j < model->inputs; j++) {
-            sum += p->rate[1 - side][i][j] * speed[j];
+            sum[i] += p->rate[1 - side][i][j] * speed[j];
         }
-        is_finite = (lkr_copy(1, &sum, &other[i]) && is_finite) || i >= model->inputs;
     }
-    return is_finite ? LKR_OK : LKR_SINGULAR;
+    (void)lkr_copy(model->count[1 - side], sum, other);
+    return lkr_copy(model->inputs, sum, other) ? LKR_OK : LKR_SINGULAR;
 }
 
 /* The same for efforts. The power of the actuators is that of the joints less that of the loads. */
@@ -507,15 +489,13 @@ static inline int lkr_efforts(const lkr_model *model, const lkr_point *p, int si
             x[i] += p->rate[side][j][i] * given[j];
         }
     }
-    if (!lkr_solve(model, 1 - side, p, 1, x)) {
-        return LKR_SINGULAR;
-    }
-    (void)lkr_copy(model->inputs, x, other);
-    return LKR_OK;
+    return lkr_solve(model, 1 - side, p, 1, x) && lkr_copy(model->inputs, x, other) ? LKR_OK
+        : LKR_SINGULAR;
 }
 
 /* From one side's positions, velocities and efforts to the other's; returns a status. A position
-   without a value is held, a velocity or an effort is 0. What is not commanded is not written. */
+   without a value is held, a velocity or an effort is 0. What is not commanded is not written, nor
+   is anything before a position is known. */
 static inline int lkr_transmit(const lkr_model *model, lkr_memory *m, int side, const lkr_side *from,
     lkr_side *to)
 {
@@ -532,12 +512,11 @@ static inline int lkr_transmit(const lkr_model *model, lkr_memory *m, int side, 
         (void)lkr_copy(model->inputs, from->position, m->held[LKR_ACTUATORS]);
     }
     position = lkr_move(model, m, side, from->position);
+    if (!m->is_known) {
+        return position | LKR_NOT_KNOWN;
+    }
     velocity = lkr_velocities(model, &m->point, side, from->velocity, speeds);
     effort = lkr_efforts(model, is_here ? &here : &m->point, side, from->effort, efforts);
-    if (!m->is_known) {
-        velocity = LKR_NOT_KNOWN;
-        effort = LKR_NOT_KNOWN;
-    }
     if (position == LKR_OUT_OF_REACH) {
         memset(speeds, 0, sizeof speeds);
         velocity &= LKR_NOT_KNOWN;
