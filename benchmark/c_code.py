@@ -37,10 +37,10 @@ USES = {
     # Next to the other end of the reach, so that each assembly mode is chosen somewhere.
     'inverse': '{number} x[2] = {{ given[{last} - k][0], given[{last} - k][{other}] }}; '
                '{inverse} out = x[0];',
-    'actuators to joints': '{measured} lkr_actuators_to_joints(&{name}_model, &memory, &side, &to); '
-                           'out = to.effort[0];',
-    'joints to actuators': '{commanded} lkr_joints_to_actuators(&{name}_model, &memory, &side, &to); '
-                           'out = to.effort[0];'}
+    'actuators to joints': '{measured} lkr_actuators_to_joints(&{name}_model, &memory, '
+                           '&side, &to); out = to.effort[0];',
+    'joints to actuators': '{commanded} lkr_joints_to_actuators(&{name}_model, &memory, '
+                           '&side, &to); out = to.effort[0];'}
 MAIN = """
 static const float given[][{n}] = {{ {given_rows} }}, found[][{n}] = {{ {found_rows} }};
 static lkr_memory memory;

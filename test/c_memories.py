@@ -39,12 +39,13 @@ class Memory:
 
     def __init__(self, library, mechanism, kind=float):
         self._send, self._n, self._shape, self._kind = (
-            library[f'{mechanism.name}_sent'], len(mechanism.inputs), (3, library.row_size()), kind)
+            library[f'{mechanism.name}_sent'], len(mechanism.inputs), (3, library.row_size()),
+            kind)
         library[f'{mechanism.name}_started']()
 
     def send(self, side, position, velocity=0.0, effort=0.0):
         """Return the status and the other side's positions, velocities, efforts: or UNWRITTEN."""
-        given, found = np.zeros(self._shape, self._kind), np.full(self._shape, UNWRITTEN, self._kind)
+        given, found = (np.full(self._shape, each, self._kind) for each in (0.0, UNWRITTEN))
         for row, values in zip(given, (position, velocity, effort)):
             row[:self._n] = values
         status = self._send(side, *(ctypes.c_void_p(x.ctypes.data) for x in (given, found)))

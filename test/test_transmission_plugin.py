@@ -109,7 +109,7 @@ class Component:
                 for i, each in enumerate(axes) for kind in kinds]
         library, namespace = plugins.libraries[name]
         self._made = ctypes.c_void_p(self._host.component_made(
-            str(library).encode(), f'{namespace}::{name.title()}Loader'.encode(),
+            str(library).encode(), f'{namespace}::{name}_loader'.encode(),
             '\n'.join(described).encode(), ctypes.c_void_p(self._memory.ctypes.data)))
         if not self._made:
             raise Refused(self._host.component_problem().decode())

@@ -5,8 +5,8 @@
  * It can be assembled in [-3.14159, 3.14159] rad.
  * A call takes at most 7 poses.
  */
-#ifndef LEVER_LINKAGE_H
-#define LEVER_LINKAGE_H
+#ifndef LINKAGE_ROS_lever_H
+#define LINKAGE_ROS_lever_H
 
 #ifndef LKR_OF
 typedef float lkr_real;
@@ -575,7 +575,7 @@ typedef struct {
     float slide_slide;            /* [m] */
 } lever_pose;
 
-/* The pose and, with has_rates, its rates by each input; returns 0 where there is none. */
+/* The pose and, with has_rates, its rates by each input; returns 0 if there is none. */
 LKR_FORMULA int lever_solve(float crank_, int has_rates,
     lever_pose *p, lever_pose *by)
 {
@@ -585,7 +585,7 @@ LKR_FORMULA int lever_solve(float crank_, int has_rates,
     const float k23 = 0.025f; /* b - a */
     const float k24 = 0.000625f; /* (b - a) * (b - a) */
     const float k27 = 0.0036f; /* (4.0 * b) * a */
-    const float k48 = 0.081f; /* 1.8 * b */
+    const float k48 = 0.081f; /* (a + b) if ((1.8 * b) < (a + b)) else (1.8 * b) */
     const float k70 = 0.000625f;
     const float k77 = 0.0f;
     const float k82 = -0.025f; /* a - b */
@@ -644,13 +644,9 @@ LKR_FORMULA int lever_solve(float crank_, int has_rates,
     return isfinite(valid);
 }
 
-/* The places of the actuators and of the joints in an lkr_side. */
-enum { LEVER_ACTUATOR_LEVER_CRANK = 0 };
-enum { LEVER_JOINT_LEVER_LEVER = 0 };
-
 /* The inputs. */
-static inline int lever_solutions_angle_crank(const float *value,
-    float (*q)[LKR_MAX_INPUTS])
+static inline int lever_solutions_angle_crank(const lkr_real *value,
+    lkr_real (*q)[LKR_MAX_INPUTS])
 {
     const float x0 = value[0];
     q[0][0] = x0;
@@ -663,8 +659,8 @@ static inline int lever_solutions_angle_crank(const float *value,
      L crank Q 0.081 up
      A slider O 0.02 Q along L out
  */
-static inline int lever_solutions_angle_lever(const float *value,
-    float (*q)[LKR_MAX_INPUTS])
+static inline int lever_solutions_angle_lever(const lkr_real *value,
+    lkr_real (*q)[LKR_MAX_INPUTS])
 {
     const float x0 = value[0];
     /* A left */
@@ -725,5 +721,5 @@ static const __attribute__((unused)) lkr_model lever_for_angle_lever = {
     { { 1.0f, 1.0f, -LKR_ENDLESS, LKR_ENDLESS, { 6.2831855f, 6.2831855f } } }, { 0.0f }
 };
 
-#endif /* LEVER_LINKAGE_H */
+#endif /* LINKAGE_ROS_lever_H */
 

@@ -71,10 +71,10 @@ class Formulas:
         # If it can be assembled at any input, rounding does not matter.
         if len(inputs) > 1 or not self._linkage.inputs[0].is_whole(self._linkage.reach()):
             valid = structure.where_assembled(valid)
+        parameters = ', '.join(f'{number} {each}' for each in inputs)
         return self._code.function(
-            '/* The pose and, with has_rates, its rates by each input; returns 0 where there is none. '
-            f'*/\nLKR_FORMULA int {name}_solve('
-            f'{", ".join(f"{number} {each}" for each in inputs)}, int has_rates,\n'
+            '/* The pose and, with has_rates, its rates by each input; returns 0 if there is none.'
+            f' */\nLKR_FORMULA int {name}_solve({parameters}, int has_rates,\n'
             f'    {name}_pose *p, {name}_pose *by)',
             [self._code.times(each, 1.0 / scale) for each, scale in zip(inputs, scales)],
             [*poses, ('', {f'const {number} valid': valid}),

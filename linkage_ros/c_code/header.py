@@ -10,13 +10,12 @@ library's sine, cosine and arctangent. What all mechanisms have in common is `li
 
 from __future__ import annotations
 
-import re
 from typing import Any, Iterator, NamedTuple, Sequence
 
 from .axes import actuators, Axis, axis, invertible, joints, loads
-from .code import Code, indented
+from .code import Code
 from .formulas import Formulas
-from .names import comment, distinct, field, filled, prefix, template
+from .names import distinct, field, filled, template
 from .tables import Tables
 from ..linkage import Mechanism
 from ..scene import SceneMechanism
@@ -89,22 +88,19 @@ def _values(request: Request, single: bool) -> dict[str, Any]:
         *(each.output for axes in (*sides, *inverses.values()) for each in axes),
         *(output for output, _ in loads(mechanism))])
     tables = Tables(mechanism, code, formulas)
-    parts = [tables.text(f'{name}_model', '; '.join(
-        f'{what}: {_with_units(linkage, axes)}' for what, axes in zip(('Actuators', 'joints'), sides)),
-        sides, request.passive)]
+    what, where = (_with_units(linkage, axes) for axes in sides)
+    parts = [tables.text(f'{name}_model', f'Actuators: {what}; joints: {where}', sides,
+                         request.passive)]
     parts += [tables.text(f'{name}_for_{tag}', f'{join_names(mechanism.inputs)} for '
                           f'{_with_units(linkage, axes)}', ([], axes))
               for tag, axes in inverses.items()]
     _, counts, functions = zip(*tables.solutions.values())
     about = [*_about(mechanism), f'A call takes at most {POSES * max(counts) + 1} poses.']
     return {
-        'about': '\n'.join(f' * {line}' for line in about),
-        'name': name, 'N': prefix(name), 'float': int(single),
-        'number': code.number, 'suffix': '##f' if single else '', 'own_inputs': len(linkage.inputs),
+        'about': '\n'.join(f' * {line}' for line in about), 'name': name, 'float': int(single),
+        'number': code.number, 'suffix': '##f' * single, 'own_inputs': len(linkage.inputs),
         'own_joints': len(sides[1]) + len(request.passive), 'own_solutions': max(counts),
         'fields': formulas.struct(), 'pose': formulas.function(),
-        'enums': '\n'.join(_enum(f'{prefix(name)}_{side}', axes) for side, axes in zip(
-            ('ACTUATOR', 'JOINT'), sides)),
         'model': '\n'.join([*functions, *parts])}
 
 
@@ -134,13 +130,6 @@ def _about(mechanism: SceneMechanism) -> Iterator[str]:
     if len(linkage.inputs) == 1 and not linkage.inputs[0].is_part:
         arcs = ' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in mechanism.first.reach)
         yield f'It can be assembled in {arcs} {linkage.inputs[0].unit}.'
-
-
-def _enum(start: str, axes: Sequence[Axis]) -> str:
-    """Return the constants of axes, whose names may have any characters."""
-    ends = distinct(re.sub(r'[^A-Z0-9]+', '_', each.name.upper()).strip('_') or 'UNNAMED'
-                    for each in axes)
-    return f'enum {{ {", ".join(f"{start}_{end} = {i}" for i, end in enumerate(ends))} }};'
 
 
 def _with_units(linkage: Mechanism, axes: Sequence[Axis]) -> str:

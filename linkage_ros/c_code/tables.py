@@ -120,35 +120,36 @@ class Tables:
             name = '_'.join([f'{self.mechanism.name}_solutions', *(
                 self._formulas.fields[output] for output in outputs)])
             *_, name = distinct([*(known for known, *_ in self.solutions.values()), name])
+            head = (f'static inline int {name}(const lkr_real *value,\n'
+                    '    lkr_real (*q)[LKR_MAX_INPUTS])')
             counted = {axis.input: (argument(i) - shift) / ratio
                        for i, axis in enumerate(axes) if axis.input is not None
                        for ratio, shift in [self.linkage.gear(axis.output, axis.input)]}
             if len(counted) == len(axes):
-                generated = self._function(name, axes, 'The inputs.', [('', counted)])
+                made = self._function(f'/* The inputs. */\n{head}', [('', counted)])
             elif closed := self.linkage.inverse(outputs).closed:
-                generated = self._closed(name, axes, counted, closed)
+                made = self._closed(head, outputs, counted, closed)
             else:
-                generated = self._series(name, *axes)
-            self.solutions[outputs] = name, *generated
+                made = self._series(head, outputs[0])
+            self.solutions[outputs] = name, *made
         return self.solutions[outputs][0]
 
-    def _series(self, name: str, axis: Axis) -> tuple[int, str]:
+    def _series(self, head: str, output: str) -> tuple[int, str]:
         """Return the most inputs of an output, and the function for them by series."""
-        code, monotone = self._code, self.linkage.monotone(axis.output)
-        pieces = series(self.linkage, axis.output, monotone, code.single, *self.mechanism.scales)
-        rows = [f'    {code.row([*row[:7], row[7:]])},' for row in pieces.tolist()]
-        turns = self.linkage.is_angle(axis.output)
-        size, turn = (1.0, math.tau) if turns else (self.linkage.longest, math.inf)
-        # Where two pieces of a monotone part meet, both have the input.
-        return min(len(rows), 2 * len(monotone)), '\n'.join([
-            f'/* The inputs of an output, in each of {len(rows)} pieces of the reach. */',
-            f'static inline int {name}(const {code.number} *value,',
-            f'    {code.number} (*q)[LKR_MAX_INPUTS])', '{',
-            f'    static const lkr_piece piece[{len(rows)}] LKR_IN_FLASH = {{',
-            indented(rows), '    };',
-            f'    return lkr_series({len(rows)}, piece, {code.literal(size)}, {code.literal(turn)}, *value, q);', '}'])
+        row, linkage = self._code.row, self.linkage
+        monotone = linkage.monotone(output)
+        pieces = series(linkage, output, monotone, self._code.single, *self.mechanism.scales)
+        is_angle, n = linkage.is_angle(output), len(pieces)
+        return min(n, 2 * len(monotone)), '\n'.join([
+            # Where two pieces of a monotone part meet, both have the input.
+            f'/* The inputs of an output, in each of {n} pieces of the reach. */',
+            head, '{', f'    static const lkr_piece piece[{n}] LKR_IN_FLASH = {{',
+            indented(f'    {row([*each[:7], each[7:]])},' for each in pieces.tolist()), '    };',
+            f'    return lkr_series({n}, piece, '
+            f'{self._code.literal(1.0 if is_angle else linkage.longest)}, '
+            f'{self._code.literal(math.tau if is_angle else math.inf)}, *value, q);', '}'])
 
-    def _closed(self, name: str, axes: Sequence[Axis], counted: Mapping[int, Real],
+    def _closed(self, head: str, outputs: Sequence[str], counted: Mapping[int, Real],
                 closed: InverseLinkage) -> tuple[int, str]:
         """Return the number of solutions of an inverse linkage, and the function for them."""
         candidates, solutions = closed.solutions(), []
@@ -160,25 +161,20 @@ class Tables:
                                   for joint, sign in zip(closed.branches, signs))
                 solutions.append((f'/* {sides} */' if sides and not any(turns) else '', {
                     i: counted.get(i, value) for i, value in enumerate(inputs)}))
-        if len(axes) == 1:
-            solutions = [solutions[k] for k in self._in_reach(
-                axes[0].output, candidates)] or solutions
-        lines = ''.join(f'\n     {comment(line)}' for line in closed.lines)
-        return self._function(
-            name, axes, 'The inputs in each assembly mode of the inverse linkage, NAN where there '
-            f'is none:{lines}\n', solutions)
+        if len(outputs) == 1:
+            solutions = [solutions[k] for k in self._in_reach(outputs[0], candidates)] or solutions
+        lines = '\n     '.join(map(comment, closed.lines))
+        return self._function('/* The inputs in each assembly mode of the inverse linkage, NAN '
+                              f'where there is none:\n     {lines}\n */\n{head}', solutions)
 
-    def _function(self, name: str, axes: Sequence[Axis], about: str,
-                  solutions: Sequence[tuple[str, Mapping[int, Real]]]) -> tuple[int, str]:
+    def _function(self, head: str, solutions: Sequence[tuple[str, Mapping[int, Real]]]
+                  ) -> tuple[int, str]:
         """Return the number of solutions, each a line above it and inputs, and the function."""
-        number, scales = self._code.number, self.mechanism.scales
+        scales = self.mechanism.scales
         return len(solutions), self._code.function(
-            f'/* {about} */\nstatic inline int {name}(const {number} *value,\n'
-            f'    {number} (*q)[LKR_MAX_INPUTS])',
-            [f'value[{i}]' for i in range(len(self.mechanism.scales))],
+            head, [f'value[{i}]' for i in range(len(scales))],
             [(above, {f'q[{k}][{i}]': value * scales[i] for i, value in inputs.items()})
-             for k, (above, inputs) in enumerate(solutions)],
-            f'return {len(solutions)};')
+             for k, (above, inputs) in enumerate(solutions)], f'return {len(solutions)};')
 
     def _in_reach(self, output: str, solutions: list[list[Real]]) -> list[int]:
         """Return which solutions of a closed form the linkage has anywhere in its reach."""
