@@ -91,13 +91,7 @@ static inline lkr_real lkr_clamped(lkr_real x, lkr_real low, lkr_real high)
 /* The whole turns nearest to x. */
 LKR_FORMULA lkr_real lkr_turns(lkr_real x, lkr_real turn)
 {
-    const lkr_real twice = 2 * LKR_MATH(fabs)(x);
-    if (twice <= turn) {
-        return 0;
-    }
-    /* A microcontroller divides slowly. */
-    return twice <= 3 * turn ? LKR_MATH(copysign)(turn, x)
-        : turn * LKR_MATH(floor)(x / turn + (lkr_real)0.5);
+    return 2 * LKR_MATH(fabs)(x) <= turn ? 0 : turn * LKR_MATH(floor)(x / turn + (lkr_real)0.5);
 }
 
 /* x within half a turn of 0. */
@@ -129,13 +123,15 @@ static __attribute__((const, noinline, unused)) lkr_real lkr_angle(lkr_real y, l
 /* Copy the values that are finite; returns whether all are. */
 static inline int lkr_copy(int n, const lkr_real *from, lkr_real *to)
 {
-    int are_finite = 1;
+    int count = 0;
     int i;
     for (i = 0; i < n; i++) {
-        to[i] = isfinite(from[i]) ? from[i] : to[i];
-        are_finite = are_finite && isfinite(from[i]);
+        if (isfinite(from[i])) {
+            to[i] = from[i];
+            count++;
+        }
     }
-    return are_finite;
+    return count == n;
 }
 
 /* --- types --- */
@@ -469,46 +465,36 @@ static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, cons
     return LKR_OK;
 }
 
-/* From velocities at a pose to those of the other side, where there are any; returns a status. */
-static inline int lkr_velocities(const lkr_model *model, const lkr_point *p, int side,
-    const lkr_real *velocity, lkr_real *other)
+/* From velocities at a pose to those of the other side, or from efforts to efforts, where there are
+   any; returns a status. Velocities become those of the inputs by the inverse Jacobian, efforts by the
+   transpose, so that the power of the actuators is that of the joints less that of the loads. */
+static inline int lkr_convert(const lkr_model *model, const lkr_point *p, int side, int is_effort,
+    const lkr_real *from, lkr_real *to)
 {
-    lkr_real speed[LKR_MAX_INPUTS] = { 0 };
-    lkr_real sum[LKR_MAX_JOINTS] = { 0 };
+    const int n = model->inputs;
+    const int count = is_effort ? n : model->count[1 - side];
+    lkr_real x[LKR_MAX_INPUTS] = { 0 };
+    lkr_real y[LKR_MAX_JOINTS] = { 0 };
     int i, j;
-    if (!lkr_copy(model->inputs, velocity, speed)) {
+    if (!lkr_copy(n, from, x)) {
         return LKR_NOT_KNOWN;
     }
-    if (!lkr_solve(model, side, p, 0, speed)) {
+    if (!is_effort && !lkr_solve(model, side, p, 0, x)) {
         return LKR_SINGULAR;
     }
-    for (i = 0; i < model->count[1 - side]; i++) {
-        for (j = 0; j < model->inputs; j++) {
-            sum[i] += p->rate[1 - side][i][j] * speed[j];
+    for (i = 0; i < count; i++) {
+        if (is_effort) {
+            y[i] = side == LKR_JOINTS ? p->load[i] : -p->load[i];
+        }
+        for (j = 0; j < n; j++) {
+            y[i] += (is_effort ? p->rate[side][j][i] : p->rate[1 - side][i][j]) * x[j];
         }
     }
-    (void)lkr_copy(model->count[1 - side], sum, other);
-    return lkr_copy(model->inputs, sum, other) ? LKR_OK : LKR_SINGULAR;
-}
-
-/* The same for efforts. The power of the actuators is that of the joints less that of the loads. */
-static inline int lkr_efforts(const lkr_model *model, const lkr_point *p, int side,
-    const lkr_real *effort, lkr_real *other)
-{
-    lkr_real given[LKR_MAX_INPUTS] = { 0 };
-    lkr_real x[LKR_MAX_INPUTS] = { 0 };
-    int i, j;
-    if (!lkr_copy(model->inputs, effort, given)) {
-        return LKR_NOT_KNOWN;
+    if (is_effort && !lkr_solve(model, 1 - side, p, 1, y)) {
+        return LKR_SINGULAR;
     }
-    for (i = 0; i < model->inputs; i++) {
-        x[i] = side == LKR_JOINTS ? p->load[i] : -p->load[i];
-        for (j = 0; j < model->inputs; j++) {
-            x[i] += p->rate[side][j][i] * given[j];
-        }
-    }
-    return lkr_solve(model, 1 - side, p, 1, x) && lkr_copy(model->inputs, x, other) ? LKR_OK
-        : LKR_SINGULAR;
+    (void)lkr_copy(count - n, y + n, to + n);
+    return lkr_copy(n, y, to) ? LKR_OK : LKR_SINGULAR;
 }
 
 /* From one side's positions, velocities and efforts to the other's; returns a status. A position
@@ -533,8 +519,8 @@ static inline int lkr_transmit(const lkr_model *model, lkr_memory *m, int side, 
     if (!m->is_known) {
         return position | LKR_NOT_KNOWN;
     }
-    velocity = lkr_velocities(model, &m->point, side, from->velocity, speeds);
-    effort = lkr_efforts(model, is_here ? &here : &m->point, side, from->effort, efforts);
+    velocity = lkr_convert(model, &m->point, side, 0, from->velocity, speeds);
+    effort = lkr_convert(model, is_here ? &here : &m->point, side, 1, from->effort, efforts);
     if (position == LKR_OUT_OF_REACH) {
         memset(speeds, 0, sizeof speeds);
         velocity &= LKR_NOT_KNOWN;

@@ -122,9 +122,7 @@ class Transmission : public transmission_interface::Transmission
 {
 public:
   Transmission(const Linkage & linkage, const hardware_interface::TransmissionInfo & info)
-  : linkage_(linkage), info_(info)
-  {
-  }
+  : linkage_(linkage), info_(info) {}
 
   /// Find handles by role or name; throws an exception that says what is wrong.
   void configure(
