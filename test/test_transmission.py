@@ -9,6 +9,7 @@ of its interface, `test/ros2_control`, written for these tests. No controller ma
 """
 
 import math
+import os
 from pathlib import Path
 import re
 import shutil
@@ -355,6 +356,14 @@ def test_every_scene_is_proved_at_a_hundred_thousand_states(tmp_path, path, comp
     package = written(tmp_path, path)
     for mechanism in scene.load(path).mechanisms.values():
         prove(package, mechanism, compiler)
+
+
+@pytest.mark.nightly
+@pytest.mark.skipif('ROS2_CONTROL' not in os.environ, reason='ROS2_CONTROL names no checkout')
+def test_packages_are_proved_with_the_headers_of_ros2_control(tmp_path):
+    ended = subprocess.run([ROOT / '.ci' / 'ros2_control', 'headers', tmp_path,
+                            os.environ['ROS2_CONTROL']], capture_output=True, text=True)
+    assert ended.returncode == 0 and ended.stdout.count(': proved') == 5, ended.stderr[:2000]
 
 
 @pytest.mark.nightly
