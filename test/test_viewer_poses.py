@@ -51,7 +51,7 @@ def test_the_page_is_told_what_it_draws_and_moves(path):
             about = told['inputs'][key]
             assert (about['speed'], about['unit']) == (2.5, drive.input.unit)
             assert about['ends'] == [drive.arcs[0][0], drive.arcs[-1][1]]
-            assert (about['turn'] is not None) == drive.input.turns
+            assert (about['turn'] is not None) == drive.input.is_angle
             other = [value + (about['turn'] or 0.0) * (j == i) for j, value in enumerate(start)]
             after = mechanism.linkage.solve(theta_of(other))
             for joint, place in mechanism.linkage.solve(theta_of(start)).items():

@@ -70,7 +70,7 @@ class Tables:
             'at': indented(self._at(rows, len(sides[1]))),
             'axes': row(row((1.0 / axis.size, axis.turn or math.inf)
                             for axis in axes) if axes else '{ { 0, 0 } }'
-                           for axes in rows),
+                        for axes in rows),
             'inputs': row(self._inputs(sides, has_sweeps=not tag)),
             'start': row(start(self.mechanism))})
 
@@ -197,5 +197,5 @@ class Tables:
         inputs = (low + steps * (high - low)).ravel()
         found = linkage.bind(Program([x for x, in solutions])).over(
             *linkage.compiled_pose((), (output,)).over(inputs))
-        apart = linkage.inputs[0].apart(found, inputs)
+        apart = linkage.inputs[0].distance(found, inputs)
         return sorted({*np.where(np.isfinite(apart), apart, math.inf).argmin(axis=0).tolist()})

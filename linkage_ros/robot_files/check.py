@@ -141,7 +141,7 @@ class _Loops:
                        for mechanism in self._mechanisms for drive in mechanism.inputs.values()}
         self._ends: dict[str, tuple[float, float]] = {}
         for drive in (drive for made in parts for drive in mechanisms[made.name].inputs.values()):
-            around = math.pi if drive.input.turns else 0.5 * component.size
+            around = math.pi if drive.input.is_angle else 0.5 * component.size
             low, high = drive.ends or (drive.start - around, drive.start + around)
             ends = sorted((end - drive.offset) / drive.ratio for end in (
                 max(low, drive.start - 2.0 * around), min(high, drive.start + 2.0 * around)))

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import re
 from typing import Any, Iterable, Mapping
 
-from .input_settings import FARTHEST, in_words, InputSettings
+from .input_settings import in_words, InputSettings, MAX_POSITION
 from .joint_names import check_distinct
 from .parameter_file import overrides, sections
 from .parameters import DRIVER, Field, INVERSE, KINEMATICS, Parameter, plain, SceneError, Values
@@ -23,7 +23,7 @@ from .scene_mechanism import FRAME, is_distinct, read_mechanism, SceneMechanism
 from .. import mechanisms
 from ..words import plain_text, short_repr
 
-__all__ = ['changed', 'InputSettings', 'DRIVER', 'FARTHEST', 'Field', 'in_words', 'INVERSE',
+__all__ = ['changed', 'InputSettings', 'DRIVER', 'MAX_POSITION', 'Field', 'in_words', 'INVERSE',
            'KINEMATICS', 'load', 'SceneMechanism', 'Parameter', 'plain', 'read', 'Scene',
            'SceneError']
 

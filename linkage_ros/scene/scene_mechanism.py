@@ -291,7 +291,7 @@ def _built(design: Design, dimensions: tuple, branches: tuple) -> Mechanism:
 
 def _legs(name: str, linkage: Mechanism, values: Values) -> tuple[int, bool]:
     first, *others = linkage.inputs
-    able = first.turns and not others and len(linkage.axes) == 2
+    able = first.is_angle and not others and len(linkage.axes) == 2
     if able:
         crank = next(link for link in linkage.links if link.name == first.name)
         able = not crank.zero and linkage.solve(0.0, (crank.joint,))[crank.joint][0] == 0.0

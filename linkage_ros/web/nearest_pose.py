@@ -66,7 +66,7 @@ def _nearest_sample(linkage: Mechanism, joint: str, goal: np.ndarray, present: f
     if not np.isfinite(path).any():
         raise ValueError('the linkage cannot be assembled here')
     width = np.nanmax(np.nanmax(path, axis=(0, 1)) - np.nanmin(path, axis=(0, 1)))
-    away = np.hypot(*np.moveaxis(path - goal, -1, 0)) + LEASH * width * linkage.inputs[0].apart(
+    away = np.hypot(*np.moveaxis(path - goal, -1, 0)) + LEASH * width * linkage.inputs[0].distance(
         samples, present) / np.ptp(samples)
     row, column = divmod(int(np.nanargmin(away)), DRAG_SAMPLES)
     return [np.array([value]) for value in (samples[row, column], *arcs[row])]
