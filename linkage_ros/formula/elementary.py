@@ -101,11 +101,11 @@ def arctangent(y: Real, x: Real) -> tuple[Real, Real]:
     steep = width < height
     low, high = where(steep, width, height), where(steep, height, width)
     numerator, denominator, start, rest = low, high, real(0.0), real(0.0)
-    for least, slope, own, after in ARCTANGENT_STARTS:
-        beyond = least * high < low
-        numerator = where(beyond, low - slope * high, numerator)
-        denominator = where(beyond, high + slope * low, denominator)
-        start, rest = where(beyond, own, start), where(beyond, after, rest)
+    for slope_limit, slope, angle_start, rest_start in ARCTANGENT_STARTS:
+        is_above = slope_limit * high < low
+        numerator = where(is_above, low - slope * high, numerator)
+        denominator = where(is_above, high + slope * low, denominator)
+        start, rest = where(is_above, angle_start, start), where(is_above, rest_start, rest)
     ratio = numerator / denominator
     square = ratio * ratio
     angle = start - ((ratio * (square * _polynomial(ARCTANGENT, square)) - rest) - ratio)

@@ -65,11 +65,11 @@ class Scene:
     @property
     def sources(self) -> dict[str, list[tuple[str, int]]]:
         """The inputs of each source joint: their mechanism's name and their index in it."""
-        found: dict[str, list[tuple[str, int]]] = {}
+        sources: dict[str, list[tuple[str, int]]] = {}
         for name, mechanism in self.mechanisms.items():
             for i, settings in enumerate(mechanism.inputs.values()):
-                found.setdefault(settings.source, []).append((name, i))
-        return found
+                sources.setdefault(settings.source, []).append((name, i))
+        return sources
 
     def changed_from(self, old: 'Scene') -> list[Parameter]:
         """Return the parameters whose values differ from an older scene of the same mechanisms."""

@@ -172,8 +172,8 @@ class SceneMechanism:
         scale, unit, first = self.scales[0], self.scale_of(output), self.first.input
         turn = first.turn if first.wraps else math.inf
         arcs = [(low / scale, min(high, low + turn) / scale) for low, high in self.first.arcs]
-        return [((least * unit, low * scale), (greatest * unit, high * scale))
-                for (least, low), (greatest, high) in self.linkage.extremes(output, arcs)]
+        return [((minimum * unit, low * scale), (maximum * unit, high * scale))
+                for (minimum, low), (maximum, high) in self.linkage.extremes(output, arcs)]
 
     @cached_property
     def ends(self) -> list[Arc | None]:

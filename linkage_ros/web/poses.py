@@ -196,12 +196,12 @@ def _output_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
     solution, _ = mechanism.follow((name,), (value,), present)
     if math.isfinite(solution[0]):
         return solution, None
-    spans, is_angle = mechanism.extremes(name), mechanism.linkage.is_angle(name)
+    arcs, is_angle = mechanism.extremes(name), mechanism.linkage.is_angle(name)
     turn = math.tau if is_angle else math.inf
     _, nearest = min((abs(math.remainder(extreme - value, turn)), at)
-                     for span in spans for extreme, at in span)
+                     for arc in arcs for extreme, at in arc)
     return [nearest], {'name': name, 'unit': 'rad' if is_angle else 'm',
-                       'arcs': [(low, high) for (low, _), (high, _) in spans]}
+                       'arcs': [(low, high) for (low, _), (high, _) in arcs]}
 
 
 def _joint_at(mechanism: SceneMechanism, present: Sequence[float], joint: str, place: Any,

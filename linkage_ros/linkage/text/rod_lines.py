@@ -234,13 +234,13 @@ class _LinkTree:
                                  'many, or one hinge too few')
             if len(links) == (line not in free):
                 return (line,), links
-        for (one, links), (other, same) in combinations(unsolved, 2):
-            if links == same and len(links) == 2 and not {one, other} & set(free) \
+        for (first, links), (second, between) in combinations(unsolved, 2):
+            if links == between and len(links) == 2 and not {first, second} & set(free) \
                     and self._in_a_row(links):
-                return (one, other), links[::-1]
+                return (first, second), links[::-1]
         line, links = min(unsolved, key=lambda rod: len(rod[1]))
-        others = [other.names[0] for other, also in unsolved
-                  if other is not line and set(also) & set(links)]
+        others = [second.names[0] for second, also in unsolved
+                  if second is not line and set(also) & set(links)]
         raise line.error(
             f'{join_names(links)} between its ends are unplaced'
             f'{f", as for {join_names(others)}" if others else ""}: one rod places one hinge or '
@@ -305,7 +305,7 @@ class _Drawing:
             self._check_joint(joint)
         for name, line in self._tree.lines.items():
             if line.word == 'rod':
-                self._lengths[name] = [*self._numbers[name][6:], self._apart(line)][0]
+                self._lengths[name] = [*self._numbers[name][6:], self._distance(line)][0]
         for name in self._tree.inputs:
             self._drive(name)
         for rods, links in self._tree.order():
@@ -315,7 +315,7 @@ class _Drawing:
                 self._place_joint(rods[0], self._joints[links[0]])
             else:
                 (name,) = rods[0].names
-                self._lengths[name] = self._within(name, self._apart(rods[0]))
+                self._lengths[name] = self._within(name, self._distance(rods[0]))
         for name, line in self._tree.lines.items():
             (self._add_rod if line.word in _RODS else self._add_joint)(name, line)
 
@@ -351,7 +351,7 @@ class _Drawing:
         numbers = self._numbers[line.names[0]]
         return _End(first, Vector(*numbers[:3])), _End(second, Vector(*numbers[3:6]))
 
-    def _apart(self, line: Line) -> Real:
+    def _distance(self, line: Line) -> Real:
         """Return the length between a rod's ends; joints that are not placed are as drawn."""
         first, second = self._ends(line)
         return self._on_link(second, first.link).minus(first.point).length()
