@@ -16,6 +16,7 @@ from typing import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from . import limits
 from .axes import Axis, loads, start
 from .code import Code, indented
 from .formulas import Formulas
@@ -85,8 +86,10 @@ class Tables:
                                     for struct in ('s', *formulas.by)]
                 if axis.offset:
                     position += f' + {code.literal(axis.offset)}'
-                if axis.wraps:
-                    position = f'lkr_wrapped({position}, {code.literal(axis.turn)})'
+                middle = limits.middle(self.mechanism, axis) if i < commanded and sides[0] else 0.0
+                if axis.wraps or middle:
+                    position = (f'lkr_near({position}, {code.literal(middle)}, '
+                                f'{code.literal(axis.turn)})')
                 yield f'p->position[{side}][{i}] = {position};'
                 yield from (f'p->rate[{side}][{i}][{j}] = {rate};' for j, rate in enumerate(rates))
                 needed += [f'p->position[{side}][{i}]'] * (i < commanded)
