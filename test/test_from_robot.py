@@ -102,7 +102,8 @@ REFUSED = [
            'lever_joint, crank_joint', 'rod_joint, crank_joint')),
     # It cannot move, but others can.
     ('four_bar.xml', [(' axis="0 -1 0"', '')],
-     'motor drive it, and hold each other, as 0 of them tell where all is: add --driven shoulder'),
+     'motor drive it, and hold each other, as 0 of them tell where all is: add --driven shoulder '
+     'to the command, in place of these.'),
     ('four_bar.sdf', [('<child>AB</child><axis>', '<child>AB</child><axis><mimic joint="joint_B">'
                        '<multiplier>inf</multiplier></mimic>')],
      "cannot be read: 'inf 0 0' must be 3 numbers within 1e+09\n"),
@@ -476,8 +477,9 @@ def test_a_cylinder_in_space_turns_a_foot(tmp_path, ends, ref, limits, ram, sign
             {'pitch': angle + ref, 'ram': ram}, abs=1e-9)
 
 
-def test_a_file_of_mujoco_needs_no_meshes_and_no_names(tmp_path):
-    robot = readers.read(str(of_text(tmp_path / 'robot.xml', """<mujoco><asset>
+@pytest.mark.parametrize('name', ['robot.xml', 'robot.mjcf', 'robot'])
+def test_a_file_of_mujoco_needs_no_meshes_and_no_names(tmp_path, name):
+    robot = readers.read(str(of_text(tmp_path / name, """<mujoco><asset>
       <mesh name="m" file="none.obj"/><hfield name="h" file="none.png" size="1 1 1 1"/>
       <texture name="t" type="2d" file="none.png"/><material name="c" texture="t"/></asset>
       <worldbody><geom type="hfield" hfield="h"/>
