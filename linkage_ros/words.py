@@ -33,10 +33,11 @@ def sentence(text: Any) -> str:
 
 
 class RequestError(Exception):
-    """An invalid request to a command; the text is one sentence."""
+    """An invalid request to a command; each of its texts is a sentence on a line of its own."""
 
-    def __init__(self, text: Any):
-        super().__init__(sentence(text))
+    def __init__(self, *texts: Any):
+        self.lines = [*map(sentence, texts)]
+        super().__init__(' '.join(self.lines))
 
 
 def short_repr(value: Any) -> str:
