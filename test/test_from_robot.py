@@ -273,7 +273,7 @@ def choices(line):
 
 @pytest.mark.parametrize('count', [1, pytest.param(12, marks=pytest.mark.nightly)])
 def test_all_legs_that_are_undecided_are_asked_in_one_run(tmp_path, count):
-    file = of_text(tmp_path / 'legs.urdf', legs(count))
+    file = of_text(tmp_path / 'legs.urdf', legs(count).replace('elbow', f'elbow_{"long" * 30}'))
     line = refused(file)
     sides = choices(line)
     assert line.count(' as with ') == count and len(sides) == 2
