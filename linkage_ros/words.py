@@ -8,7 +8,7 @@ import reprlib
 from typing import Any, Iterable
 
 # Maximum number of letters of a quoted value, of a whole message, and of a line in a terminal.
-MAX_QUOTED, MESSAGE, MAX_LINE = 60, 299, 20_000
+MAX_QUOTED, MESSAGE, MAX_LINE = 60, 599, 20_000
 
 _short = reprlib.Repr()
 _short.maxstring = _short.maxother = _short.maxlong = MAX_QUOTED

@@ -45,6 +45,8 @@ def ends(mechanism: SceneMechanism, axis: Axis) -> tuple[float, float] | None:
             for name, settings in inputs.items()]
     values = np.array(linkage.extremes(axis.output, arcs[0].tolist()))[..., 0] if len(
         arcs) == 1 else _values(mechanism, axis, arcs)
+    if np.isnan(values).all():
+        raise ValueError(f'{mechanism.name} cannot be assembled in its sweep')
     low, high = sorted(float(axis.factor * end + axis.offset)
                        for end in (np.nanmin(values), np.nanmax(values)))
     # What counts turns may do so in a sweep only.

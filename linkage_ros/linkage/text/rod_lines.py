@@ -91,7 +91,7 @@ class WindowError(ValueError):
                  limits: dict[str, tuple[float, float]]):
         largest = ', '.join(f'{name} within {math.degrees(low):.4g}deg {math.degrees(high):.4g}deg'
                             for name, (low, high) in limits.items())
-        # Not shortened: two poses are a proof. The remedy is first, as a scene shortens the text.
+        # Not shortened: two poses are a proof. The remedy is first: scenes shorten long texts.
         super().__init__(f'{line.error("")}{problem}; ' + (
             f'the largest proved to have one at most: {largest}' if limits else
             'no limits about their middle are proved to have one at most')
