@@ -261,6 +261,9 @@ def test_joints_that_move_with_no_input_are_refused():
     assert [each.name for each in joints(mechanism, ['m_QB'])] == ['m_QB']
     with pytest.raises(ValueError, match='CD of m moves nowhere'):
         joints(mechanism, ['m_CD'])
+    foot = scene.read({**SCENE, 'foot.joints': [line.replace('-50deg', '20deg') for line in G1]})
+    with pytest.raises(ValueError, match='foot cannot be assembled in its sweep'):
+        header.written(foot.mechanisms['foot'])
 
 
 def test_a_singular_pose_is_said(library, mechanisms):
