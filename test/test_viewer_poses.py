@@ -367,3 +367,6 @@ def test_no_line_goes_through_a_pole():
     ('position', 0), ('velocity', 1), ('acceleration', 2), ('transmission angle', 0)])
 def test_a_curve_says_how_it_grows_with_the_speed(kind, power):
     assert curves.curve(*mechanism_of('jansen'), kind, None)['power'] == power
+    ended = curves.curve(*mechanism_of('peaucellier'), kind, None)
+    # An end of the reach is a dead point, and is not named twice.
+    assert len(ended['ends']) == 2 and not ended['dead']
