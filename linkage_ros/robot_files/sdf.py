@@ -64,7 +64,7 @@ def read(root: Element) -> Robot:
               for parts in [[*_parts(model, '')]] if any(part.tag == 'joint' for _, part in parts)]
     if len(models) != 1:
         raise RequestError('one model of an SDF must have joints, not '
-                           + (join_names(name for name, _ in models) or 'none'))
+                           + join_names(name for name, _ in models))
     return _Model(once(models[0][1]), is_old, {'world': np.eye(4)}).robot()
 
 
