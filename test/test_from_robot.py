@@ -61,9 +61,13 @@ PIN = '{pin_loops: [{parent: coupler, child: rocker, %s: [0.3, 0, 0]}], independ
          "/loops.yaml: there is no key 'indepndent'; allowed: closures, closed_loop, pin_lo"),
         ('{closures: [{link_a: x, link_b: rocker, point: [0, 0, 0], axis: [0, 1, 0]}]}',
          "/loops.yaml: joint closures[0] is on 'x', which is no link\n"),
-        ('{closures: [{link_a: coupler, link_b: rocker, 7: 8}]}', "/loops.yaml names 'point'")))])
+        ('{closures: [{link_a: coupler, link_b: rocker, 7: 8}]}', "/loops.yaml names 'point'"),
+        ('{name_mot: [motr]}', "/loops.yaml: there is no joint 'motr'; allowed: motor, elbow, "),
+        ('{closed_loop: [coupler, rocker]}', '/loops.yaml: closed_loop must have pairs of '),
+        ('{name_mot: motor}', "/loops.yaml: name_mot must be a list, not 'motor'"),
+        ('[]', '/loops.yaml: there is no key []; allowed: ')))])
 def test_an_option_that_cannot_be_is_named(tmp_path, file, args, why):
-    args = [of_text(tmp_path / 'loops.yaml', arg) if arg.startswith('{') else arg for arg in args]
+    args = [of_text(tmp_path / 'loops.yaml', arg) if arg[0] in '{[' else arg for arg in args]
     assert refused(file, *args).replace(str(tmp_path), '').startswith(f'from_robot: {why}')
 
 
