@@ -384,7 +384,7 @@ def refused(ask, text) -> bool:
 
 
 @pytest.mark.filterwarnings('error')
-@pytest.mark.nightly(all_but=6)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('role, every', [
     *((role, 2 if role in PARSED else 10) for role in (*ROLES, *OUTPUTS)),
     *(pytest.param(role, 1, marks=pytest.mark.nightly) for role in (*ROLES, *OUTPUTS))])

@@ -213,13 +213,14 @@ class _Loops:
         fixed = component.is_of([*joints])
         isnan = np.any([np.isnan(values) for values in joints.values()], axis=0)
         pose = np.repeat(component.start, len(targets), axis=0)
-        gaps, poses = np.empty(isnan.shape), []
+        poses = []
         for k in range(steps):
             pose = component.moved_to(pose, {name: at[:, k] for name, at in joints.items()})
             pose[isnan[:, k]] = component.start
             pose = pose if fixed.all() else component.closed(pose, fixed)
-            gaps[:, k] = np.max(np.abs(component.errors(pose)[0] - self._misfit), axis=1)
             poses.append(pose)
+        gaps = np.max(np.abs(component.errors(np.concatenate(poses))[0] - self._misfit),
+                      axis=1).reshape(steps, -1).T
         gaps[isnan] = math.nan
         return Walk({**sources, **joints}, gaps, poses,
                     np.logical_and.accumulate(gaps <= self._allowed, axis=1))
