@@ -57,7 +57,7 @@ class Formulas:
 
     def function(self) -> str:
         """Return the function for all fields and their rates."""
-        structure, groups = self._linkage.structure, [*self._groups()]
+        structure, groups = self._linkage.formulas, [*self._groups()]
         name, scales, number = self._mechanism.name, self._mechanism.scales, self._code.number
         # No word of C and no macro ends so.
         inputs = [f'{name}_' for name in self._mechanism.inputs]

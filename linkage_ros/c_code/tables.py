@@ -16,6 +16,7 @@ from typing import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from . import limits
 from .axes import Axis, loads, start
 from .code import Code, indented
 from .formulas import Formulas
@@ -86,8 +87,10 @@ class Tables:
                 position = code.times(f's.{field}', factor)
                 if axis.offset:
                     position += f' + {code.literal(axis.offset)}'
-                if axis.wraps:
-                    position = f'lkr_wrapped({position}, {code.literal(axis.turn)})'
+                middle = sides[0] and i in inputs and limits.middle(self.mechanism, axis) or 0.0
+                if axis.wraps or middle:
+                    position = f'lkr_near({position}, {code.literal(middle)}, ' \
+                               f'{code.literal(axis.turn)})'
                 yield f'p->position[{side}][{i}] = {position};'
                 for j in inputs:
                     yield f'p->rate[{side}][{i}][{j}] = {code.times(f"by[{j}].{field}", factor)};'
@@ -184,5 +187,5 @@ class Tables:
         inputs = (low + steps * (high - low)).ravel()
         found = linkage.bind(Program([x for x, in solutions])).over(
             *linkage.compiled_pose((), (output,)).over(inputs))
-        apart = linkage.inputs[0].apart(found, inputs)
+        apart = linkage.inputs[0].distance(found, inputs)
         return sorted({*np.where(np.isfinite(apart), apart, math.inf).argmin(axis=0).tolist()})

@@ -142,7 +142,7 @@ def _check_driven(component: Component, pose: np.ndarray, motors: list[str], fol
         chosen = chosen or component.chosen(motions, [*component.positions])
         raise ValueError(
             f'{join_names(motors)} drive it, and hold each other, as {count} of them tell where '
-            f'all is: {_added(("driven", chosen))}')
+            f'all is: {_added(("driven", chosen))}, in place of these')
     loose, motions = component.loose(pose, motors + followers)
     if not loose:
         return

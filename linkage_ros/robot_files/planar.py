@@ -366,12 +366,12 @@ def _sweep(drive: check.Source, limits: tuple[float, float], settings: scene.Inp
     low, high = (float(short(drive.ratio * end + drive.offset, 1e-15))
                  for end in limits[::1 if drive.ratio > 0.0 else -1])
     for start, end in () if settings.input.is_whole(settings.reach) else settings.reach:
-        turns = math.tau * math.floor((drive.value - start) / math.tau) * settings.input.turns
+        turns = math.tau * math.floor((drive.value - start) / math.tau) * settings.input.is_angle
         if start + turns <= drive.value <= end + turns:
             # An end that is a dead point is not quite reached.
             edge = ROUNDING * (end - start)
             low, high = max(low, start + turns + edge), min(high, end + turns - edge)
-    if not -scene.FARTHEST < low < high - 1e-6 * settings.input.size < scene.FARTHEST:
+    if not -scene.MAX_POSITION < low < high - 1e-6 * settings.input.size < scene.MAX_POSITION:
         raise ValueError(f'the limits of {drive.source}, from {limits[0]:.4g} to {limits[1]:.4g}: '
                          'its loops do not reach them')
     return [low, high]
