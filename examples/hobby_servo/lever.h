@@ -101,17 +101,14 @@ LKR_FORMULA lkr_real lkr_near(lkr_real x, lkr_real near, lkr_real turn)
 }
 
 /* A limit that is missed by rounding counts as reached. */
-static inline lkr_real lkr_root(lkr_real x, lkr_real tolerance)
-{
-    if (x > 0) {
-        return LKR_MATH(sqrt)(x);
-    }
-    return x >= -tolerance ? 0 : LKR_NAN;
-}
-
 static inline lkr_real lkr_valid_where(lkr_real x, lkr_real margin, lkr_real tolerance)
 {
     return margin >= -tolerance ? x : LKR_NAN;
+}
+
+static inline lkr_real lkr_root(lkr_real x, lkr_real tolerance)
+{
+    return LKR_MATH(sqrt)(x > 0 ? x : lkr_valid_where(0, x, tolerance));
 }
 
 /* The angle of (x, y); a compiler leaves it out where it is not used. */
@@ -558,10 +555,14 @@ static inline int lkr_joints_to_actuators(const lkr_model *model, lkr_memory *m,
 
 /* Where the joints are, and each link to its parent. */
 typedef struct {
-    float O_x, O_y;               /* [m] */
-    float Q_x, Q_y;               /* [m] */
-    float A_x, A_y;               /* [m] */
-    float L_x, L_y;               /* [m] */
+    float O_x;                    /* [m] */
+    float O_y;                    /* [m] */
+    float Q_x;                    /* [m] */
+    float Q_y;                    /* [m] */
+    float A_x;                    /* [m] */
+    float A_y;                    /* [m] */
+    float L_x;                    /* [m] */
+    float L_y;                    /* [m] */
     float angle_crank;            /* to ground [rad] */
     float angle_lever;            /* to ground [rad] */
     float slide_slide;            /* [m] */

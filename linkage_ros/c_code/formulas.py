@@ -38,22 +38,19 @@ class Formulas:
         self._mechanism, self._code = mechanism, code
         self._linkage = linkage = mechanism.linkage
         # Points in space are of no use on a board.
-        self._points = () if mechanism.in_space else linkage.points
+        points = () if mechanism.in_space else linkage.points
         named = dict.fromkeys((
-            *(f'{point}.{axis}' for point in self._points for axis in 'xy'), *linkage.joints,
-            *outputs))
+            *(f'{point}.{axis}' for point in points for axis in 'xy'), *linkage.joints, *outputs))
         self.fields = dict(zip(named, distinct(field(linkage, output) for output in named)))
 
     def struct(self) -> str:
         """Return the fields of a pose."""
-        parents = {link.name: link.parent for link in self._linkage.links}
-        rows = [(f'{point}_x, {point}_y', '[m]') for point in self._points]
-        for output, name in [*self.fields.items()][2 * len(self._points):]:
-            is_angle = self._linkage.is_angle(output)
-            to = f'to {parents[output]} ' if is_angle and output in parents else ''
-            rows.append((name, to + ('[rad]' if is_angle else '[m]')))
-        return '\n'.join(f'    {self._code.number} {names};'.ljust(34) + f'/* {about} */'
-                         for names, about in rows)
+        linkage, rows = self._linkage, []
+        parents = {link.name: f'to {link.parent} ' for link in linkage.links}
+        for output, name in self.fields.items():
+            unit = parents.get(output, '') + '[rad]' if linkage.is_angle(output) else '[m]'
+            rows.append(f'    {self._code.number} {name};'.ljust(34) + f'/* {unit} */')
+        return '\n'.join(rows)
 
     def function(self) -> str:
         """Return the function for all fields and their rates."""

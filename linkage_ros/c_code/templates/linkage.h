@@ -83,17 +83,14 @@ LKR_FORMULA lkr_real lkr_near(lkr_real x, lkr_real near, lkr_real turn)
 }
 
 /* A limit that is missed by rounding counts as reached. */
-static inline lkr_real lkr_root(lkr_real x, lkr_real tolerance)
-{
-    if (x > 0) {
-        return LKR_MATH(sqrt)(x);
-    }
-    return x >= -tolerance ? 0 : LKR_NAN;
-}
-
 static inline lkr_real lkr_valid_where(lkr_real x, lkr_real margin, lkr_real tolerance)
 {
     return margin >= -tolerance ? x : LKR_NAN;
+}
+
+static inline lkr_real lkr_root(lkr_real x, lkr_real tolerance)
+{
+    return LKR_MATH(sqrt)(x > 0 ? x : lkr_valid_where(0, x, tolerance));
 }
 
 /* The angle of (x, y); a compiler leaves it out where it is not used. */
