@@ -267,6 +267,12 @@ def test_joints_that_move_with_no_input_are_refused():
         header.written(foot.mechanisms['foot'])
 
 
+def test_a_joint_with_an_offset_has_the_inverse_of_its_output(mechanisms):
+    text = header.written(mechanisms['lever'], ['lever'])
+    assert re.findall(r'int (\w+_solutions_angle_lever\w*)\(', text) == [
+        'lever_solutions_angle_lever']
+
+
 def test_a_singular_pose_is_said(library, mechanisms):
     mechanism, memory = mechanisms['rocker'], Memory(library, mechanisms['rocker'])
     dead = mechanism.linkage.extremes('QB')[0][0][1]
