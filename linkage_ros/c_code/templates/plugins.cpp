@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <memory>
+#include <sstream>  // for accessor.hpp of Humble
 #include <string>
 #include <vector>
 
