@@ -422,7 +422,7 @@ def test_a_line_that_is_pasted_leads_on(seeds):
 
 def refusals():
     """Return the texts of all errors and reasons for which a loop is left out."""
-    for name in ('closing', 'planar', 'rods', 'check'):
+    for name in ('closing', 'spatial', 'planar', 'rods', 'check'):
         tree = ast.parse(Path(cli.__file__).with_name(f'{name}.py').read_text())
         for node in ast.walk(tree):
             is_reason = isinstance(node, ast.FunctionDef) and node.name == '_why'

@@ -219,8 +219,8 @@ class _Loops:
             pose[isnan[:, k]] = component.start
             pose = pose if fixed.all() else component.closed(pose, fixed)
             poses.append(pose)
-        gaps = np.max(np.abs(component.errors(np.concatenate(poses))[0] - self._misfit),
-                      axis=1).reshape(steps, -1).T
+        errors = np.abs(component.errors(np.concatenate(poses))[0] - self._misfit)
+        gaps = np.column_stack(np.split(errors.max(axis=1), steps))
         gaps[isnan] = math.nan
         return Walk({**sources, **joints}, gaps, poses,
                     np.logical_and.accumulate(gaps <= self._allowed, axis=1))

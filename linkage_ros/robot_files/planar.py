@@ -398,7 +398,7 @@ def _drawn(robot: Robot, group: Group) -> Drawing:
     for i, line in enumerate(best.lines if best.drives else ()):
         # With a change point, the side in this pose may be the wrong one.
         name, *_, side = line.split()
-        if side in _OTHER:
+        if side in _OTHER and not best.error(best.lines, name) <= best.near:
             other = [*best.lines]
             other[i] = line[:-len(side)] + _OTHER[side]
             best.lines = min(best.lines, other, key=lambda lines: best.error(lines, name))
