@@ -35,7 +35,17 @@ REAL = {
                   [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]],
                   [[0.045877, 0.029559, -0.025], [0.145471, 0.026778, 0.058]],
                   [[0.289183, 0.057935, -0.020861], [0.308263, 0.051805, 0.048294]]),
-                 [(-28, -36), (30, 4)])}
+                 [(-28, -36), (30, 4)]),
+    'TienKung': (([0, 0, 0], [0, 1, 0], [0, 0, 0], [1, 0, 0],
+                  [[0, 0.045, 0.315], [0, -0.045, 0.24]], [[0, 1, 0], [0, 1, 0]],
+                  [[-0.055827, 0.045, 0.336999], [-0.055827, -0.045, 0.261999]],
+                  [[-0.05582, 0.045, 0.022], [-0.05582, -0.045, 0.022]]),
+                 [(-70, -25), (30, 25)]),
+    'AgiBot': (([0, 0, 0], [0, 1, 0], [0, 0, 0], [1, 0, 0],
+                [[-0.041, 0, 0.195], [-0.041, 0, 0.14]], [[1, 0, 0], [1, 0, 0]],
+                [[-0.041, -0.023326, 0.203993], [-0.041, 0.023328, 0.148989]],
+                [[-0.041, -0.025, 0.009], [-0.041, 0.025, 0.009]]),
+               [(-57.3, -57.3), (57.3, 57.3)])}
 ONE_ROD = (
     'out hinge ground at ox oy oz axis hx hy hz', 'crank motor ground at mx my mz axis ax ay az',
     'R rod crank px py pz out ex ey ez length l')
@@ -190,9 +200,12 @@ def test_no_pose_is_of_another_assembly(seed, count, poses):
 @pytest.mark.parametrize('turned', [1, -1])
 @pytest.mark.parametrize('robot', REAL)
 def test_the_ranges_of_real_ankles_are_proved_whatever_their_signs(robot, turned):
+    # With both axes the other way, the limits are, too.
     parts, window = REAL[robot]
+    ankle = rods.drawn(*(np.multiply(part, turned) if i in (1, 3) else part
+                         for i, part in enumerate(parts)))
     window = np.sort(np.multiply(window, turned), axis=0) * DEGREE
-    found = check_assemblies(rods.drawn(*parts), window, np.random.default_rng(1), 400)
+    found = check_assemblies(ankle, window, np.random.default_rng(1), 400)
     assert found > 3
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from robots import imported, MuJoCo, of_text, printed, published, said, words as text
 from test_robot_files import differing
+from test_rods import DEGREE, REAL
 from truth import rods
 
 # Limits of pitch and roll.
@@ -108,11 +109,14 @@ def test_an_ankle_that_differs_from_its_robot_is_refused(ankle_of_a_robot, old, 
         *ankle_of_a_robot, 'l_rods', old, new, 'l', 'r'))
 
 
-def test_an_ankle_on_a_cross_is_imported(tmp_path):
-    # As most are: both hinges of the foot cross in a point, and are no ball all the same.
-    ankle = turning(3)
-    ankle = ankle._replace(second=ankle.first)
-    check_rods(ankle, *imported(of_text(tmp_path / 'robot.xml', mjcf(ankle, NEAR))))
+@pytest.mark.parametrize('robot', REAL)
+def test_the_ankle_of_a_public_model_is_imported_with_its_range(tmp_path, robot):
+    # Both hinges of some feet cross in a point, and are no ball all the same; their motors turn
+    # about one of them, and are no planar linkage.
+    parts, limits = REAL[robot]
+    file = of_text(tmp_path / 'robot.xml', mjcf(rods.drawn(*parts), np.multiply(limits, DEGREE)))
+    assert 'Limits' not in said(file)
+    check_rods(rods.drawn(*parts), *imported(file))
 
 
 @pytest.mark.parametrize('seed, count', [(1, 2), (2, 3)])

@@ -98,7 +98,7 @@ def described(robot: Robot) -> tuple[dict[str, Any], list[str], dict[str, float]
             for part in group.parts:
                 # What is no planar mechanism may be a part of one in space.
                 with suppress(*_FAULTS if group.why else ()):
-                    imported.append(planar.described(robot, part, imported))
+                    imported.append(planar.described(robot, part, imported, fault))
                     joints = [joint for joint in joints if joint not in part.joints]
             if joints:
                 imported.append(rods.described(robot, group._replace(joints=joints), imported))

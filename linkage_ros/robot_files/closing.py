@@ -142,7 +142,7 @@ def _check_driven(component: Component, pose: np.ndarray, motors: list[str], fol
         chosen = chosen or component.chosen(motions, [*component.positions])
         raise ValueError(
             f'{join_names(motors)} drive it, and hold each other, as {count} of them tell where '
-            f'all is: {_added(("driven", chosen))}')
+            f'all is: replace them by --driven {shlex.join(chosen)} in the command')
     loose, motions = component.loose(pose, motors + followers)
     if not loose:
         return
@@ -151,10 +151,11 @@ def _check_driven(component: Component, pose: np.ndarray, motors: list[str], fol
              and joint.no_limits.endswith('no range')]
     more = component.chosen(motions, loose, stiff)
     at = component.texts(pose, component.is_of(more))
+    # Held, they must not stop all others.
+    holds = [('hold', (at[name] for name in more))] * bool(component.loose(pose, more)[0])
     raise NotDriven(
-        f'not driven: {len(more)} of {join_names(loose)} must be moved, named by --driven, or '
-        'held, named by --hold: '
-        + _added(('driven', [*motors, *more]), ('hold', (at[name] for name in more)))
+        f'not driven: {len(more)} of {join_names(loose)} must be moved{" or held" * len(holds)}: '
+        + _added(('driven', [*motors, *more]), *holds)
         + f'; the limits of {join_names(stiff)} leave no range' * bool(stiff))
 
 

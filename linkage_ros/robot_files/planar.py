@@ -10,6 +10,7 @@ The lines of a mechanism have its inputs first, then its dyads.
 from __future__ import annotations
 
 from cmath import phase
+from collections import Counter
 from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
@@ -143,9 +144,13 @@ def _pins(joint: Joint, normal: np.ndarray) -> list[tuple[Joint, float]]:
 def _check_rods(ground: str, joints: Sequence[Joint], normal: np.ndarray) -> None:
     """Raise ValueError if a body can leave the plane: only rods may be on balls alone."""
     held = {ground}
-    # A universal joint with an axis normal to the plane is a pin.
     held_by = [joint for joint in joints if joint.kind != BALL
                or len(joint.hinges) == 2 and _pins(joint, normal)]
+    # A universal joint with an axis normal to the plane is a pin, but a body can lean on it that
+    # has no other pin.
+    pinned = Counter(body for joint in held_by for body in joint.bodies) + Counter([ground])
+    held_by = [joint for joint in held_by if joint.kind != BALL
+               or min(pinned[body] for body in joint.bodies) > 1]
     while more := {end for joint in held_by for end in joint.bodies
                    if held & {*joint.bodies}} - held:
         held |= more
@@ -331,9 +336,13 @@ class Drawing(Dyads):
         return None
 
 
-def described(robot: Robot, group: Group, others: Sequence[check.Imported]
-              ) -> check.Imported:
-    """Return a mechanism; raise ValueError for loops that are no dyads."""
+def described(robot: Robot, group: Group, others: Sequence[check.Imported],
+              fault: ValueError | None) -> check.Imported:
+    """
+    Return a mechanism; raise ValueError for loops that are no dyads.
+
+    `fault` is why motors do not determine all of them, if they do not.
+    """
     drawing = _drawn(robot, group)
     joints = _joints(drawing) if drawing.drives else []
     if not joints:
@@ -344,7 +353,7 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]
         pose=[float(short(value)) for value in coordinates(drawing.frame)])
     limits, reports = robot.limits(drawing.driven)
     if drawing.left:
-        reports.append(f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.')
+        reports.append(f'Left out: {", ".join(drawing.left)}: {fault or _why(drawing)}.')
     for drive in drawing.drives:
         if drive.source in limits:
             try:
@@ -407,6 +416,8 @@ def _drawn(robot: Robot, group: Group) -> Drawing:
 
 def _why(drawing: Drawing) -> str:
     """Return why bodies are left."""
+    if not drawing.left:
+        return 'no passive joint of it has a position that moves'
     holders = [joint for joint in drawing.joints if {*joint.bodies} & {*drawing.left}]
     freedom = 3 * len(drawing.left) - 2 * len(holders) - sum(
         joint in drawing.driven for joint in holders)
