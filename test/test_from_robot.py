@@ -99,7 +99,7 @@ REFUSED = [
     ('foot.urdf', [], 'they stay open by ', '--hold', 'z_1=-0.27', 'x_0=1.23'),
     *(('whitworth.xml', [], f'{names} drive it, and hold each other, as 1 of them tell where all '
        'is: replace them by --driven ', '--driven', *names.split(', ')) for names in (
-           'lever_joint, crank_joint', 'rod_joint, crank_joint')),
+           'lever_joint, crank_joint', 'crank_joint, rod_joint')),
     # It cannot move, but others can.
     ('four_bar.xml', [(' axis="0 -1 0"', '')],
      'motor drive it, and hold each other, as 0 of them tell where all is: replace them by '),

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from robots import imported, MuJoCo, of_text, printed, published, said, words as text
 from test_robot_files import differing
-from test_rods import DEGREE, REAL
 from truth import rods
 
 # Limits of pitch and roll.
@@ -109,14 +108,15 @@ def test_an_ankle_that_differs_from_its_robot_is_refused(ankle_of_a_robot, old, 
         *ankle_of_a_robot, 'l_rods', old, new, 'l', 'r'))
 
 
-@pytest.mark.parametrize('robot', REAL)
+@pytest.mark.parametrize('robot', rods.REAL)
 def test_the_ankle_of_a_public_model_is_imported_with_its_range(tmp_path, robot):
     # Both hinges of some feet cross in a point, and are no ball all the same; their motors turn
     # about one of them, and are no planar linkage.
-    parts, limits = REAL[robot]
-    file = of_text(tmp_path / 'robot.xml', mjcf(rods.drawn(*parts), np.multiply(limits, DEGREE)))
+    parts, limits = rods.REAL[robot]
+    ankle = rods.drawn(*parts)
+    file = of_text(tmp_path / 'robot.xml', mjcf(ankle, limits))
     assert 'Limits' not in said(file)
-    check_rods(rods.drawn(*parts), *imported(file))
+    check_rods(ankle, *imported(file))
 
 
 @pytest.mark.parametrize('seed, count', [(1, 2), (2, 3)])

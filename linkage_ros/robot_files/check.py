@@ -110,7 +110,7 @@ def compared(robot: Robot, mechanisms: Mapping[str, scene.SceneMechanism],
     reports: list[str] = []
     wrong: dict[str, str] = {}
     for component in components(robot):
-        parts = [made for made in imported if {*made.driven} & component.positions.keys()]
+        parts = [made for made in imported if {*made.driven} & component.named.keys()]
         if parts:
             try:
                 reports.append(_Loops(robot, component, mechanisms, parts).report())
@@ -134,7 +134,7 @@ class _Loops:
                  mechanisms: Mapping[str, scene.SceneMechanism], parts: Sequence[Imported]):
         self._component, self._parts = component, parts
         self._mechanisms = [mechanism for name, mechanism in mechanisms.items()
-                            if published({name: mechanism}) & component.positions.keys()]
+                            if published({name: mechanism}) & component.named.keys()]
         self._motors = {name: robot.source(name) for made in parts for name in made.driven}
         # Where each source starts, and between which positions it moves.
         self._start = {drive.source: robot.positions[drive.source]
@@ -172,7 +172,7 @@ class _Loops:
         start = self._positions({name: np.array([value]) for name, value in self._start.items()})
         seen = component.read(component.moved_to(component.start, start))
         for name in start:
-            off = float(seen[name][0]) - component.positions[name]
+            off = float(seen[name][0] - component.read(component.start)[name][0])
             off = abs(off) / component.unit[component.named[name]]
             if off > OTHER + self._slack:
                 raise Difference(f'{self._at(self._start)} {name} is off by {off:.2g}')

@@ -101,8 +101,8 @@ def _closed(robot: Robot, seed: int) -> Closed:
     moves: dict[str, np.ndarray] = {}
     positions: dict[str, float] = {}
     for component in components(robot):
-        motors = [name for name in component.positions if name in robot.driven]
-        followers = robot.followers(component.positions)
+        motors = [name for name in component.named if name in robot.driven]
+        followers = robot.followers(component.named)
         try:
             pose, report = nearest(component, motors, followers, seed)
             made.report.extend([report] * bool(report))
@@ -139,7 +139,7 @@ def _check_driven(component: Component, pose: np.ndarray, motors: list[str], fol
     count = len(chosen := component.chosen(motions, motors))
     if count < len(motors):
         # Motors that nothing lets move are replaced.
-        chosen = chosen or component.chosen(motions, [*component.positions])
+        chosen = chosen or component.chosen(motions, [*component.named])
         raise ValueError(
             f'{join_names(motors)} drive it, and hold each other, as {count} of them tell where '
             f'all is: replace them by --driven {shlex.join(chosen)} in the command')
@@ -149,7 +149,7 @@ def _check_driven(component: Component, pose: np.ndarray, motors: list[str], fol
     _check_unfolded(component, pose, motors, DEAD_POINT)
     stiff = [joint.name for joint in component.joints if joint.name in loose
              and joint.no_limits.endswith('no range')]
-    more = component.chosen(motions, loose, stiff)
+    more = component.chosen(motions, sorted(loose, key=lambda name: name not in stiff))
     at = component.texts(pose, component.is_of(more))
     # Held, they must not stop all others.
     holds = [('hold', (at[name] for name in more))] * bool(component.loose(pose, more)[0])
