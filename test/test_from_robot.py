@@ -144,6 +144,11 @@ SAID = [
     ('four_bar.sdf', [], ['--driven', 'joint_D', '--pose', 'joint_D=0.1'], 'Checked: joint_D'),
     # Three bodies on a pin, of which a motor turns two against each other.
     ('four_bar.sdf', [('      <pose>0 0 -0.2 0 0 0</pose>\n', '')], [], 'Checked: joint_C: '),
+    # Held, it could not move.
+    ('rack.sdf', [], ['--driven', 'rack_slide'], ' must be moved: add --driven tip_motor to the'),
+    # A part that nothing drives says so, beside the mechanism that is imported.
+    ('wheel_leg.urdf', [], ['--driven', 'crank_motor'],
+     'thigh, shin, tendon: not driven: 1 of hip, bell_joint, knee, tendon_joint must be moved or '),
     ('toe_rod.xml', [], [], ': a ball or a free joint has no one position'),
     ('folded.urdf', within(0.5, 2.0), [], 'Started inside the limits of the file: motor at 0.6')]
 
@@ -344,6 +349,7 @@ OPEN = {
     'a foot in one': ('foot.urdf', {'pitch': 2.0}, ''),
     'legs in two poses each': (legs(2), {}, 'as with'),
     'a motor that moves': ('boom.urdf', {'boom_cylinder': 5.0}, ''),
+    'a motor that moves in space': ('cylinder.xml', {'ram': 3.0}, ''),
     'bars in line': ('folded.urdf', {'elbow': 0.2, 'shoulder': 0.1}, 'as with')}
 
 
