@@ -120,9 +120,8 @@ def _checked(robot: Robot, balls: Sequence[Sequence[str]], imported: Sequence[ch
     if not imported:
         raise cli.RequestError(' '.join(reports) or 'no joint of this robot closes a loop; those '
                                'of a URDF are in a file of their own: --loops FILE')
-    parameters: dict[str, Any] = {'mechanisms': [made.name for made in imported]}
-    for made in imported:
-        parameters.update(made.parameters)
+    parameters = {'mechanisms': [made.name for made in imported], **{
+        key: value for made in imported for key, value in made.parameters.items()}}
     mechanisms = scene.read(parameters).mechanisms
     known = check.published(mechanisms)
     # Of a ball of which some hinges turn the others stay.

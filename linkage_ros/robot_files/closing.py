@@ -107,8 +107,7 @@ def _closed(robot: Robot, seed: int) -> Closed:
             pose, report = nearest(component, motors, followers, seed)
             made.report.extend([report] * bool(report))
             moves.update(component.moves(pose))
-            positions.update((name, float(value[0]))
-                             for name, value in component.read(pose[None]).items())
+            positions.update((name, float(at)) for name, at in component.read(pose).items())
             apart = np.linalg.norm(component.errors(pose[None])[0].reshape(-1, 3), axis=1).max()
             if apart > LEANING * component.size:
                 raise ValueError(f'its loops cannot be closed: they stay open by {apart:.3g} m, '
@@ -132,9 +131,8 @@ def _check_driven(component: Component, pose: np.ndarray, motors: list[str], fol
     if not component.loose(pose, [], LEANING)[0]:
         fixed = [joint.name for joint in component.joints
                  if joint.kind == FIXED and joint.is_cut and joint.name]
-        raise ValueError('it cannot move, as its joints hold each other' + (
-            f': {join_names(fixed)} makes one body of two, where a pin has the type 3d'
-            if fixed else ''))
+        raise ValueError('it cannot move, as its joints hold each other' + bool(fixed) * (
+            f': {join_names(fixed)} makes one body of two, where a pin has the type 3d'))
     motions = component.free_ways(pose, component.is_of([]), LEANING)
     count = len(chosen := component.chosen(motions, motors))
     if count < len(motors):

@@ -165,8 +165,7 @@ class _Model:
 
     def _axis(self, name: str, axis: Element | None) -> np.ndarray:
         """Return an axis as the joint's frame has it."""
-        if axis is None:
-            return np.array([0.0, 0.0, 1.0])
+        axis = Element('axis') if axis is None else axis
         way, turned = numbers(text(axis, 'xyz', '0 0 1')), self.frame(name)[:3, :3]
         if seen := attribute(axis, 'xyz', 'expressed_in'):
             return turned.T @ self.frame(self.named(name, seen))[:3, :3] @ way

@@ -270,9 +270,8 @@ class Component:
 
     def texts(self, pose: np.ndarray, which: Any) -> dict[str, str]:
         """Return the positions of some screws with names in a pose, each as NAME=VALUE."""
-        positions = self.read(pose[None])
-        return {name: f'{name}={round(float(positions[name][0]), 6) + 0.0:.5g}'
-                for name, i in self.named.items() if which[i]}
+        return {name: f'{name}={round(float(at), 6) + 0.0:.5g}'
+                for name, at in self.read(pose).items() if which[self.named[name]]}
 
     def moves(self, pose: np.ndarray) -> dict[str, np.ndarray]:
         """Return the displacement of each body on its parent in a pose."""
@@ -315,9 +314,9 @@ class Component:
         return [name for name, i in self.named.items() if is_free(motions)[i]], motions
 
     def read(self, poses: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the positions of named joints [rad or m], within half a turn of the file's."""
+        """Return positions of named joints [rad or m], within half a turn of the file's."""
         positions = self._starts + np.where(self._slides, poses, wrapped(poses))
-        return {name: positions[:, i] for name, i in self.named.items()}
+        return {name: positions[..., i] for name, i in self.named.items()}
 
 
 def wrapped(angles: np.ndarray) -> np.ndarray:
