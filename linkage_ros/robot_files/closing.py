@@ -259,11 +259,9 @@ def nearest(component: Component, motors: list[str], followers: list[str], seed:
         distances = np.linalg.norm(component.away(some) * determined, axis=1)
         first, *more = np.argsort(distances + NEARLY * np.linalg.norm(some, axis=1))
         pose[which] = some[first, which]
-        for i in more:
-            alike = distances[i] < ALIKE * distances[first] + ALIKE_LENGTH
-            if alike and (question := _question(component, some[[first, i]], determined)):
-                questions += question
-                break
+        choices = (_question(component, some[[first, i]], determined) for i in more
+                   if distances[i] < ALIKE * distances[first] + ALIKE_LENGTH)
+        questions += next(filter(None, choices), [])
     if questions:
         raise _choice(questions, 'the file has them open, and they close as well')
     return pose, report

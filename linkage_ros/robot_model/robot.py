@@ -416,13 +416,11 @@ def with_positions(robot: Robot, values: Mapping[str, float],
             screw = screws(joint.motion(body), joint.place(base), slides)
             step = exponentials(screw, change, slides)
         moved[body] = moved[base] @ step
-    joints = []
-    for joint in robot.joints:
-        turned, shifted = zip(*((moved[body][:3, :3], moved[body][:3, 3])
-                                for body in joint.bodies))
-        joints.append(replace(
-            joint, places=tuple(map(np.add, map(np.matmul, turned, joint.places), shifted)),
-            axes=tuple(map(np.matmul, turned, joint.axes)),
-            position=None if joint.position is None else values.get(joint.name, joint.position)))
+    joints = [replace(
+        joint, places=[(moved[body] @ [*place, 1.0])[:3]
+                       for body, place in zip(joint.bodies, joint.places)],
+        axes=[moved[body][:3, :3] @ axis for body, axis in zip(joint.bodies, joint.axes)],
+        position=None if joint.position is None else values.get(joint.name, joint.position))
+        for joint in robot.joints]
     return replace(robot, joints=joints, frames={
         body: moved[body] @ frame for body, frame in robot.frames.items()})
