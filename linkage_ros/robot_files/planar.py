@@ -263,10 +263,8 @@ class Drawing(Dyads):
             raise ValueError(joint.name)
         parent, child = joint.bodies
         if joint.kind == SLIDE:
-            block = child if self.parts[child].slide is joint else parent
+            block, = (body for body in joint.bodies if self.parts[body].slide is joint)
             part = self.parts[block]
-            if part.slide is not joint:
-                raise ValueError(joint.name)
             sign = math.copysign(1.0, (part.along / joint.motion(block)).real)
             way = (self.on[block][part.joint] - part.start) / part.along
             return part.link, sign, way.real
