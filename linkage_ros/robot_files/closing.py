@@ -185,11 +185,8 @@ def _check_unfolded(component: Component, pose: np.ndarray, motors: list[str], l
     """Raise ValueError at a dead point, which a linkage can leave in two ways."""
     if not motors:
         # Without motors, drive a joint that this pose does not stop.
-        motions = component.free_ways(pose, component.is_of([]), least)
-        if len(motions) <= component.nullity(component.is_of([])):
-            return
-        sizes = np.linalg.norm(motions, axis=0)
-        motors = [max(component.named, key=lambda name: sizes[component.named[name]])]
+        sizes = np.linalg.norm(component.free_ways(pose, component.is_of([]), least), axis=0)
+        motors = [max(component.named, key=lambda name: sizes[component.named[name]], default='')]
     fixed = component.is_of(motors)
     questions: list[Question] = []
     steps = sorted((pose + ahead * component.unit * fixed for ahead in (ASIDE, -ASIDE)),

@@ -214,6 +214,7 @@ class Drawing(Dyads):
             [slides.get(joint) or Hinge(joint.bodies, joint.places, joint.axes[0],
                                         -joint.axes[0] * joint.start, joint)
              for joint in self.driven], size, near)
+        self.farthest = size + max(abs(joint.start) for joint in self.joints)
         self.decompose()
 
     def _flatten(self, group: Group, drives: Sequence[str]) -> None:
@@ -312,10 +313,6 @@ class Drawing(Dyads):
         self.drives.append(check.Source(word + number, source, ratio, offset, value))
         return number, ''
 
-    def position(self, joint: Joint) -> float:
-        """Return the position of a joint's motor in the file."""
-        return joint.start
-
     def special_line(self, place: complex, other: complex, one: Pin, two: Pin) -> str | None:
         """Return the start of a line for bars that mirror others, and so pass dead points."""
         (first, start), (second, end) = one, two
@@ -352,13 +349,14 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported],
     limits, reports = robot.limits(drawing.driven)
     if drawing.left:
         reports.append(f'Left out: {", ".join(drawing.left)}: {fault or _why(drawing)}.')
-    for drive in drawing.drives:
-        if drive.source in limits:
-            try:
-                parameters[f'{name}.{drive.name}.sweep'] = _sweep(
-                    drive, limits[drive.source], mechanism.inputs[drive.name])
-            except ValueError as error:
-                reports.append(f'Left out: {error}.')
+    for drive in [drive for drive in drawing.drives if drive.source in limits]:
+        ends, settings = limits[drive.source], mechanism.inputs[drive.name]
+        low, high = _sweep(drive, ends, settings)
+        if -scene.FARTHEST < low < high - 1e-6 * settings.input.size < scene.FARTHEST:
+            parameters[f'{name}.{drive.name}.sweep'] = [low, high]
+        else:
+            reports.append(f'Left out: the limits of {drive.source}, from {ends[0]:.4g} to '
+                           f'{ends[1]:.4g}: its loops do not reach them.')
     slack = drawing.lean + drawing.gap / drawing.size
     if slack > EXACT:
         reports.append(f'Warning: the file is not exact: axes lean by {drawing.lean:.2g} rad, and '
@@ -368,8 +366,8 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported],
 
 
 def _sweep(drive: check.Source, limits: tuple[float, float], settings: scene.InputSettings
-           ) -> list[float]:
-    """Return the limits of an input within its reach; raise ValueError if it has no such ends."""
+           ) -> tuple[float, float]:
+    """Return the limits of an input within its reach, no range if they are apart."""
     low, high = (float(short(drive.ratio * end + drive.offset, 1e-15))
                  for end in limits[::1 if drive.ratio > 0.0 else -1])
     for start, end in () if settings.input.is_whole(settings.reach) else settings.reach:
@@ -378,10 +376,7 @@ def _sweep(drive: check.Source, limits: tuple[float, float], settings: scene.Inp
             # An end that is a dead point is not quite reached.
             edge = ROUNDING * (end - start)
             low, high = max(low, start + turns + edge), min(high, end + turns - edge)
-    if not -scene.FARTHEST < low < high - 1e-6 * settings.input.size < scene.FARTHEST:
-        raise ValueError(f'the limits of {drive.source}, from {limits[0]:.4g} to {limits[1]:.4g}: '
-                         'its loops do not reach them')
-    return [low, high]
+    return low, high
 
 
 def _drawn(robot: Robot, group: Group) -> Drawing:

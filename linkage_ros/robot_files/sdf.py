@@ -157,9 +157,8 @@ class _Model:
                    None if second is None else self._axis(name, second))
         mimic = part.find('axis/mimic')
         if mimic is not None:
-            values = (text(mimic, tag, otherwise) for tag, otherwise in (
-                ('multiplier', '1'), ('reference', '0'), ('offset', '0')))
-            ratio, start, offset = numbers(' '.join(values))
+            ratio, start, offset = numbers([text(mimic, *each) for each in (
+                ('multiplier', '1'), ('reference', '0'), ('offset', '0'))])
             robot.follow(name, self.named(name, mimic.get('joint', '')), ratio,
                          offset - ratio * start)
 
