@@ -429,7 +429,7 @@ def quoted(node):
 def refusals(tree):
     """Yield the text of each error, and of each reason for which a loop is left out."""
     for node in ast.walk(tree):
-        is_reason = isinstance(node, ast.FunctionDef) and node.name == '_why'
+        is_reason = isinstance(node, ast.FunctionDef) and node.name[:4] == '_why'
         for part in ast.walk(node) if is_reason else [node]:
             if isinstance(part, (ast.Raise, ast.Return) if is_reason else ast.Raise):
                 # What is passed on has no words of its own.

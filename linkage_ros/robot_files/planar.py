@@ -82,12 +82,8 @@ def _groups(robot: Robot, joints: list[Joint]) -> list[Group]:
         edges = {tree[body][1] for body in bodies} | {*closures}
         # The parent of the first body is nearest to the root.
         ground = next(base for body, (base, _) in tree.items() if body in bodies)
-        group = Group(ground, [joint for joint in joints if joint in edges], '', [])
-        try:
-            _check_planar(ground, group.joints)
-        except ValueError as error:
-            group = group._replace(why=str(error))
-        groups.append(group)
+        inside = [joint for joint in joints if joint in edges]
+        groups.append(Group(ground, inside, _why_not_planar(ground, inside), []))
     return groups
 
 
@@ -117,22 +113,25 @@ def chain(joint: Joint, start: str) -> Sequence[tuple[Joint, float]]:
     return parts if joint.bodies[0] == start else [(hinge, -sign) for hinge, sign in parts[::-1]]
 
 
-def _check_planar(ground: str, joints: Sequence[Joint], drives: Sequence[str] = ()
-                 ) -> list[Joint]:
-    """Return the hinges, the first of which has the plane's normal; raise ValueError if none."""
-    hinges = sorted((joint for joint in joints if joint.kind == HINGE),
-                    key=lambda joint: (joint.name not in drives, ground not in joint.bodies))
+def _hinges(ground: str, joints: Sequence[Joint], drives: Sequence[str] = ()) -> list[Joint]:
+    """Return the hinges, of which the first has the plane's normal."""
+    return sorted((joint for joint in joints if joint.kind == HINGE),
+                  key=lambda joint: (joint.name not in drives, ground not in joint.bodies))
+
+
+def _why_not_planar(ground: str, joints: Sequence[Joint]) -> str:
+    """Return why loops are not planar; '' if they are."""
+    hinges = _hinges(ground, joints)
     if not hinges:
-        raise ValueError('not planar: no hinge says in which plane')
+        return 'not planar: no hinge says in which plane'
     for joint in joints:
         if joint.kind not in _FLAT:
-            raise ValueError(f'not planar: {joint.name} is a joint of type {joint.kind}')
+            return f'not planar: {joint.name} is a joint of type {joint.kind}'
         if (askew := lean(joint, hinges[0].axes[0])) > ASKEW:
-            raise ValueError(f'not planar: the axes of {hinges[0].name} and {joint.name} are '
-                             f'{np.degrees(np.arcsin(min(askew, 1.0))):.3g} degrees from it, more '
-                             f'than {np.degrees(ASKEW):.2g}')
-    _check_rods(ground, joints, hinges[0].axes[0])
-    return hinges
+            return (f'not planar: the axes of {hinges[0].name} and {joint.name} are '
+                    f'{np.degrees(np.arcsin(min(askew, 1.0))):.3g} degrees from it, more '
+                    f'than {np.degrees(ASKEW):.2g}')
+    return _why_loose(ground, joints, hinges[0].axes[0])
 
 
 def _pins(joint: Joint, normal: np.ndarray) -> list[tuple[Joint, float]]:
@@ -141,8 +140,8 @@ def _pins(joint: Joint, normal: np.ndarray) -> list[tuple[Joint, float]]:
             if hinge.kind == HINGE and lean(hinge, normal) < ASKEW]
 
 
-def _check_rods(ground: str, joints: Sequence[Joint], normal: np.ndarray) -> None:
-    """Raise ValueError if a body can leave the plane: only rods may be on balls alone."""
+def _why_loose(ground: str, joints: Sequence[Joint], normal: np.ndarray) -> str:
+    """Return which body can leave the plane, '' if none: only rods may be on balls alone."""
     held = {ground}
     held_by = [joint for joint in joints if joint.kind != BALL
                or len(joint.hinges) == 2 and _pins(joint, normal)]
@@ -157,7 +156,8 @@ def _check_rods(ground: str, joints: Sequence[Joint], normal: np.ndarray) -> Non
     for body in dict.fromkeys(end for joint in joints for end in joint.bodies):
         ends = [joint.bodies for joint in joints if body in joint.bodies]
         if body not in held and (len(ends) != 2 or not all(held & {*pair} for pair in ends)):
-            raise ValueError(f'not planar: {body} hangs on balls alone, and is no rod')
+            return f'not planar: {body} hangs on balls alone, and is no rod'
+    return ''
 
 
 class Drawing(Dyads):
@@ -181,7 +181,7 @@ class Drawing(Dyads):
     Raises
     ------
     ValueError
-        If it is not planar, or not closed.
+        If it is not closed.
 
     """
 
@@ -220,7 +220,7 @@ class Drawing(Dyads):
     def _flatten(self, group: Group, drives: Sequence[str]) -> None:
         """Set the plane, and the joints in it."""
         ground = group.ground
-        hinges = _check_planar(ground, group.joints, drives)
+        hinges = _hinges(ground, group.joints, drives)
         base, up = self._robot.frames[ground], hinges[0].axes[0]
         self.lean = max(lean(joint, up) for joint in group.joints)
         normal = base[:3, :3].T @ up
