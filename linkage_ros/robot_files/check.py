@@ -158,10 +158,9 @@ class _Loops:
             self._ends.get(source, (value,) * 2) for source, value in self._start.items()]).T
         walk, beyond = self._walk_to(corners if len(self._ends) == 1 else np.random.default_rng(
             1).uniform(low, high, (PATHS, len(low))))
-        moved = ', '.join(f'{source} from {min(values.min(), first):.4g} to '
-                          f'{max(values.max(), first):.4g}' for source in self._ends
-                          for first, values in [(self._start[source],
-                                                 walk.joints[source][walk.good])])
+        moved = ', '.join(
+            f'{source} from {min(values):.4g} to {max(values):.4g}' for source in self._ends
+            for values in [[self._start[source], *walk.joints[source][walk.good]]])
         names, gaps = ', '.join(made.name for made in self._parts), walk.gaps[walk.good]
         return (f'Checked: {names}: in {gaps.size} poses of the robot, {moved}, its loops stand '
                 f'open by {gaps.max():.0e} m at most{beyond}.')

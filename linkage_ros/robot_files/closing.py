@@ -148,9 +148,9 @@ def _check_driven(component: Component, pose: np.ndarray, motors: list[str], fol
     stiff = [joint.name for joint in component.joints if joint.name in loose
              and joint.no_limits.endswith('no range')]
     more = component.chosen(motions, sorted(loose, key=lambda name: name not in stiff))
-    at = component.texts(pose, component.is_of(more))
     # Held, they must not stop all others.
-    holds = [('hold', (at[name] for name in more))] * bool(component.loose(pose, more)[0])
+    holds = [('hold', component.texts(pose, component.is_of(more)).values())] * bool(
+        component.loose(pose, more)[0])
     raise NotDriven(
         f'not driven: {len(more)} of {join_names(loose)} must be moved{" or held" * len(holds)}: '
         + _added(('driven', [*motors, *more]), *holds)

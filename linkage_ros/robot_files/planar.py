@@ -10,7 +10,6 @@ The lines of a mechanism have its inputs first, then its dyads.
 from __future__ import annotations
 
 from cmath import phase
-from collections import Counter
 from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
@@ -147,9 +146,9 @@ def _why_loose(ground: str, joints: Sequence[Joint], normal: np.ndarray) -> str:
                or len(joint.hinges) == 2 and _pins(joint, normal)]
     # A universal joint with an axis normal to the plane is a pin, but a body can lean on it that
     # has no other pin.
-    pinned = Counter(body for joint in held_by for body in joint.bodies) + Counter([ground])
+    pinned = [ground, *(body for joint in held_by for body in joint.bodies)]
     held_by = [joint for joint in held_by if joint.kind != BALL
-               or min(pinned[body] for body in joint.bodies) > 1]
+               or min(map(pinned.count, joint.bodies)) > 1]
     while more := {end for joint in held_by for end in joint.bodies
                    if held & {*joint.bodies}} - held:
         held |= more

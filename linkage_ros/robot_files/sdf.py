@@ -174,8 +174,7 @@ class _Model:
 
 
 def _pose(part: Element) -> np.ndarray:
-    if not (values := text(part, 'pose')):
-        return np.eye(4)
+    values = text(part, 'pose', '0 0 0 0 0 0')
     if attribute(part, 'pose', 'rotation_format') == 'quat_xyzw':
         *place, x, y, z, w = numbers(values, 7)
         return at(place, turned_by((w, x, y, z)))

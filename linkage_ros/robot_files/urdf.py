@@ -38,9 +38,8 @@ def read(root: Element) -> Robot:
     joints = once((attribute(joint, 'child', 'link'), joint) for joint in root.findall('joint'))
     bases = {child: attribute(joint, 'parent', 'link') for child, joint in joints.items()}
     # Drake's ground needs no link, and a link of its name no joint.
-    grounds = {'world'}.intersection(bases.values())
-    roots = [link for link in {**links, **dict.fromkeys(grounds)}
-             if link not in joints and (link != 'world' or grounds)]
+    grounds = {*links} - {'world'} | {'world'}.intersection(bases.values())
+    roots = [link for link in grounds if link not in joints]
     if len(roots) != 1:
         raise RequestError(f'a URDF has one root link, not {len(roots)}')
     robot = Robot(roots[0], {roots[0]: np.eye(4)})
@@ -57,7 +56,7 @@ def read(root: Element) -> Robot:
             ratio, start = numbers(f'{mimic.get("multiplier", 1)} {mimic.get("offset", 0)}', 2)
             robot.follow(name, mimic.get('joint', ''), ratio, start)
     if 'world' in links and 'world' not in robot.frames:
-        robot.add_body('world', roots[0], [0.0] * 6)
+        robot.add_body('world', robot.root, [0.0] * 6)
     _close_by_elements(robot, root)
     _close_by_frames(robot)
     sdf.join(robot, root.findall('gazebo/joint'))
