@@ -75,16 +75,14 @@ def closed(robot: Robot, seed: int = 0) -> Closed:
     If that does not determine a pose, joints outside their limits start inside them. The `seed`
     is that of the starts of a search, on which no answer may depend.
     """
-    made = _closed(robot, seed)
-    if not made.faults:
-        return made
     inside = {}
     for joint in robot.joints:
         low, high = joint.range
         if joint.position is not None and not low <= joint.position <= high:
             margin = INSIDE * min(high - low, 1.0)
             inside[joint.name] = low + margin if joint.position < low else high - margin
-    other = _closed(with_positions(robot, inside), seed)
+    made = _closed(robot, seed)
+    other = _closed(with_positions(robot, inside), seed) if made.faults and inside else made
     if len(other.faults) >= len(made.faults):
         return made
     where = ', '.join(f'{name} at {value:.4g}' for name, value in inside.items())

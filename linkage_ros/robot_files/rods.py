@@ -155,13 +155,11 @@ class Rods:
         """Return the lines, with limits for some other than the file's."""
         lines, motors = [], {drive.name for drive in self.drives}
         for name, (joint, end) in self.links.items():
-            within = ''
-            if name not in motors:
-                # Relative to the pose of the robot.
-                low, high = limits.get(name) or np.subtract(joint.range, joint.start)
-                widest = math.inf if joint.kind == SLIDE else _ANY
-                if -widest < low < high < widest:
-                    within = f' within {short(low)} {short(high)}'
+            # Relative to the pose of the robot.
+            low, high = limits.get(name) or np.subtract(joint.range, joint.start)
+            widest = math.inf if joint.kind == SLIDE else _ANY
+            is_limited = name not in motors and -widest < low < high < widest
+            within = f' within {short(low)} {short(high)}' if is_limited else ''
             word = 'motor' if name in motors else joint.kind
             lines.append(f'{name} {word} {end}{within}')
         return lines + self.rods

@@ -165,12 +165,12 @@ class _Model:
     def _axis(self, name: str, axis: Element | None) -> np.ndarray:
         """Return an axis as the joint's frame has it."""
         axis = Element('axis') if axis is None else axis
-        way, turned = numbers(text(axis, 'xyz', '0 0 1')), self.frame(name)[:3, :3]
-        if seen := attribute(axis, 'xyz', 'expressed_in'):
-            return turned.T @ self.frame(self.named(name, seen))[:3, :3] @ way
-        if text(axis, 'use_parent_model_frame', str(self._is_old).lower()) in ('1', 'true'):
-            return turned.T @ self.frame(name.rpartition('::')[0])[:3, :3] @ way
-        return way
+        seen, way = attribute(axis, 'xyz', 'expressed_in'), numbers(text(axis, 'xyz', '0 0 1'))
+        of_model = text(axis, 'use_parent_model_frame', str(self._is_old).lower())
+        if not seen and of_model not in ('1', 'true'):
+            return way
+        base = self.named(name, seen) if seen else name.rpartition('::')[0]
+        return self.frame(name)[:3, :3].T @ self.frame(base)[:3, :3] @ way
 
 
 def _pose(part: Element) -> np.ndarray:
