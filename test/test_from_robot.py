@@ -420,6 +420,10 @@ def test_a_line_that_is_pasted_leads_on(seeds):
     assert pasted >= max(1, len(seeds) // 10)
 
 
+def test_where_other_loops_of_the_same_source_end_a_loop_goes_on():
+    assert 'compared with' not in '\n'.join(answer(undecided(358)))
+
+
 def quoted(node):
     """Return the texts in a part of a module, with dots between them."""
     return '...'.join(each.value for each in ast.walk(node) if isinstance(

@@ -170,7 +170,7 @@ class _Loops:
         component = self._component
         start = self._positions({name: np.array([value]) for name, value in self._start.items()})
         seen = component.read(component.moved_to(component.start, start))
-        for name in [name for name in start if name in seen]:
+        for name in start:
             off = float(seen[name][0] - component.read(component.start)[name][0])
             off = abs(off) / component.unit[component.named[name]]
             if off > OTHER + self._slack:
@@ -224,7 +224,7 @@ class _Loops:
                     np.logical_and.accumulate(gaps <= self._allowed, axis=1))
 
     def _positions(self, sources: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Return positions of all joints of the mechanisms along paths."""
+        """Return positions of the loops' joints along paths."""
         positions = {**sources, **{name: ratio * sources[source] + offset
                                    for name, (source, ratio, offset) in self._motors.items()}}
         for mechanism in self._mechanisms:
@@ -233,7 +233,7 @@ class _Loops:
             angles = mechanism.linkage.joint_angles(theta_of(values))
             positions.update((called.name, called.of(angles[link]))
                              for link, called in mechanism.joints.items() if called.published)
-        return positions
+        return {name: at for name, at in positions.items() if name in self._component.named}
 
     def _check_end(self, walk: Walk, path: int, step: int) -> None:
         """

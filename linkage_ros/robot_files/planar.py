@@ -213,7 +213,7 @@ class Drawing(Dyads):
             [slides.get(joint) or Hinge(joint.bodies, joint.places, joint.axes[0],
                                         -joint.axes[0] * joint.start, joint)
              for joint in self.driven], size, near)
-        self.farthest = size + max(abs(joint.start) for joint in self.joints)
+        self.farthest += max([0.0, *(abs(joint.start) for joint in slides)])
         self.decompose()
 
     def _flatten(self, group: Group, drives: Sequence[str]) -> None:
