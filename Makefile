@@ -93,7 +93,7 @@ docs: .venv-docs/.installed ## Build the documentation to docs/_build/html/; a b
 
 # What else is installed for pytest, such as colcon's repetitions, only takes its time.
 pytest = PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 PYTEST_PLUGINS=xdist.plugin,slipcover.pytest_plugin \
-  ROS_PYTHON_CHECK_FIELDS=1 python $(measuring) -m pytest -n 2 --dist worksteal
+  ROS_PYTHON_CHECK_FIELDS=1 python $(measuring) -m pytest -n 2 --dist worksteal -p no:logging
 
 .PHONY: test
 test: ready ## Run the tests, but for the nightly ones

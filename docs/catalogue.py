@@ -134,6 +134,20 @@ def index() -> str:
 Each is a few [constructions](constructions.md). Any other planar linkage of dyads is written in
 the same words: type `custom`, in [a scene](../tutorial.md) or in Python.
 
+On the pages, a joint's angle counts counterclockwise from its zero: for links on the ground from
++x, else from the parent's bar. To try a type, `four_bar.yaml`:
+
+```yaml
+/**:
+  ros__parameters:
+    mechanisms: [four_bar]
+```
+
+```console
+$ python -m linkage_ros.render four_bar.yaml --out four_bar.gif
+$ ros2 run linkage_ros scene --ros-args --params-file four_bar.yaml
+```
+
 ```{{toctree}}
 :hidden:
 
@@ -158,15 +172,13 @@ def page(type_: str) -> str:
 {chr(10).join(part + chr(10) for part in rest)}
 ## Dimensions
 
-{table(['name', 'default [m]', 'used in'], dimensions(design))}
+{table(['name', 'default [m]'], dimensions(design))}
 
 Each dimension {100 * change(linkage):g} % smaller and larger, and {effect(linkage)}:
 
 ![Curves for changed dimensions]({type_}_dimensions.svg)
 
 ## Construction
-
-Joint by joint, each from those before it, in closed form:
 
 {table(['joint', 'construction'], constructions(design))}
 
@@ -177,25 +189,7 @@ Joint by joint, each from those before it, in closed form:
 
 {table(['joint state', 'kind', 'parent', 'at', 'points to', 'zero'], links(linkage))}
 
-A joint's angle is counted from its zero: for links on the ground from +x, else from the parent's
-bar; counterclockwise is positive.
-
-## Try it
-
-As a scene, `{type_}.yaml`:
-
-```yaml
-/**:
-  ros__parameters:
-    mechanisms: [{type_}]
-```
-
-```console
-$ python -m linkage_ros.render {type_}.yaml --out {type_}.gif
-$ ros2 run linkage_ros scene --ros-args --params-file {type_}.yaml
-```
-
-In Python:
+## In Python
 
 ```python
 from linkage_ros import mechanisms
@@ -212,13 +206,8 @@ def table(head, rows) -> str:
 
 
 def dimensions(design):
-    """Yield a row for each dimension: its name, default, and the lines it is in."""
-    for name, default in design.dimensions.items():
-        word = re.compile(rf'\b{name}\b')
-        used = [line.text for line in design.lines
-                if any(kind not in ('FIRST', 'SECOND') and word.search(arg)
-                       for kind, arg, _ in line.arguments if arg not in placed(design))]
-        yield f'`{name}`', f'{default:g}', ', '.join(f'`{text}`' for text in used)
+    """Return a row for each dimension: its name and default."""
+    return ((f'`{name}`', f'{default:g}') for name, default in design.dimensions.items())
 
 
 def effect(linkage) -> str:
@@ -270,9 +259,7 @@ def doc_blocks(text):
             yield markdown(' '.join(block.split()))
 
 
-def placed(design):
-    """Return the names of all joints."""
-    return {name for line in design.lines for name in line.names}
+
 
 
 def reach(linkage) -> str:

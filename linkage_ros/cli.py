@@ -81,7 +81,8 @@ def run(name: str, work: Callable, args: Sequence[str] | None) -> int:
         # Python would try to write the rest at its end, and say that it cannot.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     if why:
-        print(f'{name}: {sentence(why)}', file=sys.stderr)
+        lines = why.lines if isinstance(why, RequestError) else [sentence(why)]
+        print(*(f'{name}: {line}' for line in lines), sep='\n', file=sys.stderr)
     return 1 if why else 0
 
 

@@ -8,7 +8,7 @@ import reprlib
 from typing import Any, Iterable
 
 # Maximum number of letters of a quoted value, of a whole message, and of a line in a terminal.
-MAX_QUOTED, MESSAGE, MAX_LINE = 60, 299, 4000
+MAX_QUOTED, MESSAGE, MAX_LINE = 60, 599, 20_000
 
 _short = reprlib.Repr()
 _short.maxstring = _short.maxother = _short.maxlong = MAX_QUOTED
@@ -21,10 +21,10 @@ def plain_text(value: Any) -> Any:
     return str.__str__(value) if isinstance(value, str) else value
 
 
-def truncated(text: str, most: int = MAX_QUOTED) -> str:
+def truncated(text: str, limit: int = MAX_QUOTED) -> str:
     """Return a text as one line of limited length, with unprintable letters escaped."""
-    start = ''.join(c if c.isprintable() else ascii(c)[1:-1] for c in text[:most + 1])
-    return start if len(start) <= most else start[:most - 3] + '...'
+    start = ''.join(c if c.isprintable() else ascii(c)[1:-1] for c in text[:limit + 1])
+    return start if len(start) <= limit else start[:limit - 3] + '...'
 
 
 def sentence(text: Any) -> str:
@@ -33,10 +33,11 @@ def sentence(text: Any) -> str:
 
 
 class RequestError(Exception):
-    """An invalid request to a command; the text is one sentence."""
+    """An invalid request to a command; each of its texts is a sentence on a line of its own."""
 
-    def __init__(self, text: Any):
-        super().__init__(sentence(text))
+    def __init__(self, *texts: Any):
+        self.lines = [*map(sentence, texts)]
+        super().__init__(' '.join(self.lines))
 
 
 def short_repr(value: Any) -> str:
@@ -61,19 +62,19 @@ def did_you_mean(word: Any, names: Iterable[str]) -> str:
     return ''.join(f'; did you mean {truncated(by_case[name])}?' for name in near)
 
 
-def suggestion(word: Any, names: Iterable[str], most: int = MAX_QUOTED) -> str:
+def suggestion(word: Any, names: Iterable[str], limit: int = MAX_QUOTED) -> str:
     """Return the end of a sentence on an unknown word: the allowed names, and the most similar."""
     names = list(names)
-    return f'; allowed: {join_names(names, most)}{did_you_mean(word, names)}'
+    return f'; allowed: {join_names(names, limit)}{did_you_mean(word, names)}'
 
 
-def join_names(names: Iterable[str], most: int = MAX_QUOTED) -> str:
+def join_names(names: Iterable[str], limit: int = MAX_QUOTED) -> str:
     """Return names separated by commas; of many, the first ones and the number of all."""
     names = list(names)
     shown, text = [], ''
     for name in names:
-        shown.append(truncated(name, most // 2))
+        shown.append(truncated(name, limit // 2))
         text = ', '.join(shown)
-        if len(text) > most:
+        if len(text) > limit:
             return ', '.join((*shown[:-1], f'... ({len(names)})'))
     return text or 'none'

@@ -108,7 +108,7 @@ class Solver:
 
     def _leg(self, leg, values, speeds):
         inputs = self.mechanism.linkage.inputs
-        own = [leg.start + leg.side * (value - leg.lag) if input_.turns else value / leg.size
+        own = [leg.start + leg.side * (value - leg.lag) if input_.is_angle else value / leg.size
                for value, input_ in zip(values, inputs)]
         axes = len(self.mechanism.linkage.axes)
         found = self._places(*own)
@@ -118,7 +118,7 @@ class Solver:
         if speeds is None:
             return places, angles, []
         rates = self._rates(*own)
-        own = [speed if input_.turns else speed / leg.size
+        own = [speed if input_.is_angle else speed / leg.size
                for speed, input_ in zip(speeds, inputs)]
         by = [rates[i * len(angles):(i + 1) * len(angles)] for i in range(len(inputs))]
         return places, angles, [
@@ -732,7 +732,7 @@ class Generator:
         if kind < 0.35:
             wide = 0.3 * (high - low)
             return float(self._random.uniform(low - wide, high + wide))
-        turns = math.tau * self._random.integers(-2, 3) if drive.input.turns else 0.0
+        turns = math.tau * self._random.integers(-2, 3) if drive.input.is_angle else 0.0
         return float(self._random.uniform(low, high) + turns)
 
     def _odd(self):

@@ -54,9 +54,10 @@ def _printed(*args, texts):
 
 
 def refused(file, *args):
-    """Return the sentence that refuses a file."""
+    """Return the sentences that refuse a file, a line for each loop."""
     code, out, err = printed(file, *args)
-    assert code == 1 and not out and err.count('\n') == 1 and 'Traceback' not in err
+    assert code == 1 and not out and 'Traceback' not in err
+    assert err.count('\n') == err.count('from_robot: ') > 0
     return err
 
 

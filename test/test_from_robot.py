@@ -61,9 +61,13 @@ PIN = '{pin_loops: [{parent: coupler, child: rocker, %s: [0.3, 0, 0]}], independ
          "/loops.yaml: there is no key 'indepndent'; allowed: closures, closed_loop, pin_lo"),
         ('{closures: [{link_a: x, link_b: rocker, point: [0, 0, 0], axis: [0, 1, 0]}]}',
          "/loops.yaml: joint closures[0] is on 'x', which is no link\n"),
-        ('{closures: [{link_a: coupler, link_b: rocker, 7: 8}]}', "/loops.yaml names 'point'")))])
+        ('{closures: [{link_a: coupler, link_b: rocker, 7: 8}]}', "/loops.yaml names 'point'"),
+        ('{name_mot: [motr]}', "/loops.yaml: there is no joint 'motr'; allowed: motor, elbow, "),
+        ('{closed_loop: [coupler, rocker]}', '/loops.yaml: closed_loop must have pairs of '),
+        ('{name_mot: motor}', "/loops.yaml: name_mot must be a list, not 'motor'"),
+        ('[]', '/loops.yaml: there is no key []; allowed: ')))])
 def test_an_option_that_cannot_be_is_named(tmp_path, file, args, why):
-    args = [of_text(tmp_path / 'loops.yaml', arg) if arg.startswith('{') else arg for arg in args]
+    args = [of_text(tmp_path / 'loops.yaml', arg) if arg[0] in '{[' else arg for arg in args]
     assert refused(file, *args).replace(str(tmp_path), '').startswith(f'from_robot: {why}')
 
 
@@ -277,7 +281,7 @@ def choices(line):
 
 @pytest.mark.parametrize('count', [1, pytest.param(12, marks=pytest.mark.nightly)])
 def test_all_legs_that_are_undecided_are_asked_in_one_run(tmp_path, count):
-    file = of_text(tmp_path / 'legs.urdf', legs(count))
+    file = of_text(tmp_path / 'legs.urdf', legs(count).replace('elbow', f'elbow_{"long" * 30}'))
     line = refused(file)
     sides = choices(line)
     assert line.count(' as with ') == count and len(sides) == 2
@@ -335,7 +339,8 @@ def doubled(folder, text, root):
 
 def test_lines_that_are_printed_of_two_loops_are_pasted_one_after_the_other(tmp_path):
     file = doubled(tmp_path, legs(1), '<link name="base"/>')
-    (one, _), (two, _) = zip(*[iter(choices(refused(file)))] * 2)
+    # Each on a line of its own.
+    (one, _), (two, _) = map(choices, refused(file).splitlines())
     assert 'Left out' not in said(file, *one, *two)
     file = doubled(tmp_path, (ROBOTS / 'five_bar.urdf').read_text(), '<link name="hip"/>')
     loops = loops_of(tmp_path, 'name_mot: [mot_front, mot_front_b]',
@@ -490,8 +495,9 @@ def test_a_cylinder_in_space_turns_a_foot(tmp_path, ends, ref, limits, ram, sign
             {'pitch': angle + ref, 'ram': ram}, abs=1e-9)
 
 
-def test_a_file_of_mujoco_needs_no_meshes_and_no_names(tmp_path):
-    robot = readers.read(str(of_text(tmp_path / 'robot.xml', """<mujoco><asset>
+@pytest.mark.parametrize('name', ['robot.xml', 'robot.mjcf', 'robot'])
+def test_a_file_of_mujoco_needs_no_meshes_and_no_names(tmp_path, name):
+    robot = readers.read(str(of_text(tmp_path / name, """<mujoco><asset>
       <mesh name="m" file="none.obj"/><hfield name="h" file="none.png" size="1 1 1 1"/>
       <texture name="t" type="2d" file="none.png"/><material name="c" texture="t"/></asset>
       <worldbody><geom type="hfield" hfield="h"/>

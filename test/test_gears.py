@@ -68,7 +68,7 @@ def test_a_pose_is_answered_in_the_turn_in_which_it_is(ratio):
                 0.0, abs=1e-12 + 8.0 * size * math.ulp(theta))
 
 
-@pytest.mark.parametrize('turns', [0, 5, 7, -27])
+@pytest.mark.parametrize('turns', [0, 7, -27])
 @pytest.mark.parametrize('more, outputs', [
     ((), ('E.x', 'QB')), (('drive',), ('QB', 'drive')),
     (('drive', 'shaft'), ('QB', 'drive', 'shaft'))])

@@ -90,7 +90,7 @@ def test_special_linkages_have_each_pose_and_no_other(special):
             errors = np.sin(errors) if linkage.is_angle(output) else errors
             assert (np.abs(errors) <= 1e-9 * size)[np.isfinite(alone)].all(), (output, at, alone)
             if tell and value == value:
-                assert np.nanmin(first.apart(alone, at)) < 1e-6, (output, at, alone)
+                assert np.nanmin(first.distance(alone, at)) < 1e-6, (output, at, alone)
                 assert linkage.input_for(output, value, at) == pytest.approx(at, abs=1e-6)
 
 

@@ -286,7 +286,7 @@ def test_a_dimension_is_a_number_or_an_array_of_numbers(value):
     for create in (lambda: made(b=value), lambda: mechanisms.create('four_bar', b=value)):
         with pytest.raises(ValueError, match='dimension b must .*, got ') as said:
             create()
-        assert len(str(said.value)) < 300
+        assert len(str(said.value)) < 600
 
 
 @pytest.mark.parametrize('value', [3, 3.0, Fraction(3), np.float32(3), np.int8(3), np.array(3),
@@ -318,7 +318,7 @@ def test_a_type_is_one_of_the_catalogue_or_custom(kind):
     for ask in (mechanisms.create, mechanisms.design, mechanisms.defaults):
         with pytest.raises(ValueError, match='type .*; allowed: water_drop, jansen') as said:
             ask(kind)
-        assert len(str(said.value)) < 300
+        assert len(str(said.value)) < 600
 
 
 def four_bar_scene(**more):
@@ -379,12 +379,12 @@ def refused(ask, text) -> bool:
     except ValueError as error:
         said, kind = str(error), type(error)
     assert kind in (ValueError, scene.SceneError), (kind, text[:60])
-    assert 10 < len(said) < 300 and said.isprintable(), (text[:60], said)
+    assert 10 < len(said) < 600 and said.isprintable(), (text[:60], said)
     return True
 
 
 @pytest.mark.filterwarnings('error')
-@pytest.mark.nightly(all_but=6)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('role, every', [
     *((role, 2 if role in PARSED else 10) for role in (*ROLES, *OUTPUTS)),
     *(pytest.param(role, 1, marks=pytest.mark.nightly) for role in (*ROLES, *OUTPUTS))])
@@ -420,7 +420,7 @@ def test_points_and_joints_are_names(names):
                 lambda _, names: BAR.input_for(names, 0.5)):
         with pytest.raises(ValueError, match='must be a name or a list|custom has no') as e:
             ask(0.5, names)
-        assert len(str(e.value)) < 300
+        assert len(str(e.value)) < 600
 
 
 def test_one_point_is_one_name_to_a_function_as_well():

@@ -174,7 +174,7 @@ def answers(kind, values, near):
     return found, np.reshape([each.size for each in inverse.inputs], (-1, 1))
 
 
-@pytest.mark.nightly(all_but=6)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('kind', INVERSES)
 @pytest.mark.parametrize('follows', [True, False])
 def test_the_inverse_chooses_as_the_library_does(kind, follows, strict):

@@ -140,7 +140,7 @@ def angles(rng):
     """Return angles of every size, many of them next to multiples of a quarter turn."""
     powers = 2.0 ** np.arange(-1074.0, 1024.0)
     multiples = np.pi / 2 * np.concatenate([np.arange(200), rng.integers(200, 2 ** 15, 800)])
-    edge = elementary.LARGEST_ANGLE
+    edge = elementary.MAX_ANGLE
     close = [np.nextafter(multiples, sign * np.inf) for sign in (-1, 1)]
     sizes = np.concatenate([powers * rng.uniform(1.0, 2.0, powers.size), multiples, *close,
                             np.pi / 4 * np.arange(1, 400, 2), rng.uniform(0.0, 4.0, 800),

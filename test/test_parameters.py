@@ -82,7 +82,7 @@ def test_no_value_of_any_kind_spoils_any_parameter(graph, kind, least):
     for name in names:
         for result in client.set(*[(name, value) for value in hostile]):
             if not result.successful:
-                assert 20 < len(result.reason) < 300
+                assert 20 < len(result.reason) < 600
                 assert all(part in result.reason for part in name.split('.')), result.reason
         assert type(scene.plain(node.get_parameter(name).value)) is type(before[name])
         back = Parameter(name, Parameter.Type[node.fields[name].kind.upper()], before[name])
@@ -124,7 +124,7 @@ def test_names_and_types_that_there_are_not_are_refused(graph):
         odd, *[_message(name, 1.0) for name in ('', 'leg', 'leg.', '.', 'nobody', 'x' * 10 ** 6)],
         _message('leg.crank.speed', 2.0), _message('leg.scale', 3.0)]).results
     assert [r.successful for r in results] == [False] * 8 + [True]
-    assert all(0 < len(r.reason) < 300 for r in results[:8])
+    assert all(0 < len(r.reason) < 600 for r in results[:8])
     together = client.call('set_parameters_atomically', [
         _message('leg.scale', 4.0), _message('nobody', 1.0)]).result
     assert not together.successful

@@ -109,7 +109,7 @@ def test_a_thousand_random_linkages_hold(batch):
     assert not found, report(found)
 
 
-@pytest.mark.nightly(all_but=3)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('name', LISTED)
 def test_a_listed_linkage_holds_what_any_must(name):
     found, _ = checks.problems(LISTED[name], np.random.default_rng(0))
@@ -190,7 +190,7 @@ MENDED = {
 }
 
 
-@pytest.mark.nightly(all_but=6)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('name', MENDED)
 def test_what_once_broke_the_rule_keeps_it(name):
     joints, values = MENDED[name]

@@ -157,8 +157,8 @@ def check_mjcf(one, root, starts, places, weight):
     for servo, joint, (name, drive) in zip(
             root.find('actuator'), published, one.inputs.items(), strict=True):
         arm = math.dist(*(places[leg + point] for point in (links[name].joint, links[name].tip))
-                        ) if drive.input.turns else size
-        force, way = (weight * arm, 1e-3) if drive.input.turns else (weight, 1e-3 * arm)
+                        ) if drive.input.is_angle else size
+        force, way = (weight * arm, 1e-3) if drive.input.is_angle else (weight, 1e-3 * arm)
         assert (servo.tag, servo.get('joint')) == ('position', joint.name)
         assert float(servo.get('kp')) == pytest.approx(force / way)
         assert numbers(servo.get('forcerange')) == pytest.approx([-10.0 * force, 10.0 * force])

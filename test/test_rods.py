@@ -8,7 +8,7 @@ import random
 import re
 
 import gmpy2
-from linkage_ros import mechanisms
+from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header
 from linkage_ros.linkage import FORMS, WindowError
 from linkage_ros.linkage.geometry import window as proof
@@ -212,8 +212,11 @@ def test_limits_with_a_second_or_a_singular_pose_are_refused(seed, count):
 @pytest.mark.parametrize('seed', [2, 1, 3, 4, 5, 8])
 def test_the_two_poses_of_refused_limits_are_two_poses(seed):
     ankle = rods.random_ankle(np.random.default_rng(seed))
+    lines = ankle.within([-1.6, -1.4], [1.6, 1.4])
     with pytest.raises(WindowError) as error:
-        made(ankle.within([-1.6, -1.4], [1.6, 1.4]))
+        made(lines)
+    with pytest.raises(scene.SceneError, match=re.escape(error.value.problem[-99:])):
+        scene.read({'mechanisms': ['ankle'], 'ankle.type': 'rods', 'ankle.joints': lines})
     left, right, *poses = map(float, re.search(
         r'[lr] at ([^,]+), [lr] at ([^,]+), pitch at (\S+), roll at (\S+) '
         r'as well as pitch at (\S+), roll at ([^;]+)$', error.value.problem).groups())

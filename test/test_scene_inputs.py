@@ -80,7 +80,7 @@ class Case:
         """Return d output / d input, (outputs, inputs), by differences."""
         columns = []
         for i, drive in enumerate(self.drives):
-            step = 1e-5 * (1.0 if drive.input.turns else self.scale)
+            step = 1e-5 * (1.0 if drive.input.is_angle else self.scale)
             beside = [[*inputs[:i], inputs[i] + side * step, *inputs[i + 1:]] for side in (1, -1)]
             high, low = (np.array(self.at(each, outputs)) for each in beside)
             columns.append((high - low) / (2.0 * step))

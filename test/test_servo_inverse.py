@@ -45,7 +45,7 @@ ONE = 'mechanism may be empty only if the scene has a single'
          'lever_angle has 10001 values; give up to 10000 at once'),
         ({'servo_near': [0.1, 0.2]}, 'servo_near must be empty, have one angle, or one for each '
          'of the 1 in lever_angle, not 2'),
-        *(({'servo_near': [bad]}, FAR) for bad in (math.nan, 1e308, -1.1 * scene.FARTHEST)),
+        *(({'servo_near': [bad]}, FAR) for bad in (math.nan, 1e308, -1.1 * scene.MAX_POSITION)),
         ({'mechanism': 10 ** 6 * 'x'},
          f"there is no mechanism '{27 * 'x'}...{28 * 'x'}'; allowed: {MECHANISMS}"),
         ({'mechanism': 'slotted_levr'}, "there is no mechanism 'slotted_levr'; allowed: "

@@ -23,7 +23,7 @@ def agree(linkage, outputs, values, expected, sure=1e-3):
     found, expected, worst = linkage.inputs_for(outputs, values), list(expected), 0.0
     assert len(found) == len(expected), (linkage, values, found, expected)
     for inputs, bends in expected:
-        gap, answer = min((max(input_.apart(x, y) / input_.size for input_, x, y in zip(
+        gap, answer = min((max(input_.distance(x, y) / input_.size for input_, x, y in zip(
             linkage.inputs, answer.inputs, inputs)), answer) for answer in found)
         assert gap * answer.margin < 1e-12, (linkage, values, inputs, answer)
         assert answer.margin < sure or bends.items() <= answer.signs.items()

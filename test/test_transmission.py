@@ -95,6 +95,8 @@ def test_both_ways_are_those_of_the_scene(library, mechanisms, name):
             continue
         status, (position, velocity, effort) = memory.send(0, actuator, by @ speeds, torques)
         assert status == 0
+        # Joints that pass half a turn from zero are reported in one range.
+        joint = joint + math.tau * np.round((position - joint) / math.tau)
         np.testing.assert_allclose(position, joint, rtol=1e-12, atol=1e-12)
         np.testing.assert_allclose(velocity, turning @ speeds, rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(
@@ -195,6 +197,14 @@ def test_single_precision_reads_a_sensor_that_has_turned_for_long(tmp_path):
                 for turns in (0, -100, -3000)] == [0, 0, 0]
 
 
+def test_a_motor_on_a_link_that_turns_goes_on_in_its_turn(tmp_path):
+    mechanism = alone(DRAG, **{'crank.measures': 'QB'})
+    memory = Memory(compiled(tmp_path, [mechanism], 'm_crank'), mechanism)
+    for angle in np.linspace(13.0, -13.0, 200):
+        _, (crank, *_) = memory.send(0, [angle])
+        assert memory.send(1, crank + 0.01)[1][0] == pytest.approx(angle, abs=0.5)
+
+
 def test_a_command_leads_back_into_the_sweep(tmp_path):
     mechanism = alone(SLOT, **{'crank.start': 0.5, 'crank.sweep': [0.2, 0.8]})
     memory = Memory(compiled(tmp_path, [mechanism], 'm_A.y'), mechanism)
@@ -251,6 +261,9 @@ def test_joints_that_move_with_no_input_are_refused():
     assert [each.name for each in joints(mechanism, ['m_QB'])] == ['m_QB']
     with pytest.raises(ValueError, match='CD of m moves nowhere'):
         joints(mechanism, ['m_CD'])
+    foot = scene.read({**SCENE, 'foot.joints': [line.replace('-50deg', '20deg') for line in G1]})
+    with pytest.raises(ValueError, match='foot cannot be assembled in its sweep'):
+        header.written(foot.mechanisms['foot'])
 
 
 def test_a_singular_pose_is_said(library, mechanisms):
@@ -472,16 +485,22 @@ def test_joint_limits_are_those_of_all_poses(capsys, path):
             assert high - slack <= np.nanmax(values) <= high + 1e-9
 
 
-def test_joint_limits_can_be_commanded(capsys, tmp_path):
-    limits, mechanisms = {}, []
-    for path in (ROOT / 'examples' / 'leg.yaml', ROOT / 'config' / 'slotted_lever.yaml'):
+def test_joint_limits_can_be_commanded_and_measured(capsys, tmp_path):
+    limits, mechanisms, file = {}, [], tmp_path / 'watt.yaml'
+    # A joint beyond half a turn, and one that passes it.
+    file.write_text('/**: {ros__parameters: {mechanisms: [four, watt], watt: {type: watt}, '
+                    'four: {type: four_bar, joint_names: [QB=four-6.0]}}}')
+    for path in (ROOT / 'examples' / 'leg.yaml', ROOT / 'config' / 'slotted_lever.yaml', file):
         limits |= limits_of(capsys, path)
         mechanisms += scene.load(path).mechanisms.values()
     library = compiled(tmp_path, mechanisms)
     for mechanism in mechanisms:
         joint, = joints(mechanism)
-        assert [Memory(library, mechanism).send(1, [end])[0] & 1
-                for end in limits[joint.name]] == [0, 0]
+        low, high = limits[joint.name]
+        assert [Memory(library, mechanism).send(1, [end])[0] & 1 for end in (low, high)] == [0, 0]
+        for inputs in states(mechanism, 30):
+            assert low < Memory(library, mechanism).send(
+                0, expected(mechanism, inputs)[0])[1][0] < high
 
 
 @pytest.mark.parametrize('name, more, limits', [

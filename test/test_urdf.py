@@ -64,7 +64,7 @@ def drives(one, count=41):
         return np.concatenate([np.linspace(*arc, count) for arc in one.first.reach])[:, None]
     ends = np.transpose([(drive.input.low, drive.input.high) for drive in one.inputs.values()])
     rows = np.random.default_rng(0).uniform(*ends, (5 * count, len(one.inputs)))
-    sizes = [1.0 if drive.input.turns else one.scale for drive in one.inputs.values()]
+    sizes = [1.0 if drive.input.is_angle else one.scale for drive in one.inputs.values()]
     held = np.isfinite(list(one.linkage.solve((rows / sizes).T).values())).all(axis=(0, 2))
     return rows[held]
 

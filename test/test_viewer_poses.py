@@ -51,7 +51,7 @@ def test_the_page_is_told_what_it_draws_and_moves(path):
             about = told['inputs'][key]
             assert (about['speed'], about['unit']) == (2.5, drive.input.unit)
             assert about['ends'] == [drive.arcs[0][0], drive.arcs[-1][1]]
-            assert (about['turn'] is not None) == drive.input.turns
+            assert (about['turn'] is not None) == drive.input.is_angle
             other = [value + (about['turn'] or 0.0) * (j == i) for j, value in enumerate(start)]
             after = mechanism.linkage.solve(theta_of(other))
             for joint, place in mechanism.linkage.solve(theta_of(start)).items():
@@ -367,3 +367,6 @@ def test_no_line_goes_through_a_pole():
     ('position', 0), ('velocity', 1), ('acceleration', 2), ('transmission angle', 0)])
 def test_a_curve_says_how_it_grows_with_the_speed(kind, power):
     assert curves.curve(*mechanism_of('jansen'), kind, None)['power'] == power
+    ended = curves.curve(*mechanism_of('peaucellier'), kind, None)
+    # An end of the reach is a dead point, and is not named twice.
+    assert len(ended['ends']) == 2 and not ended['dead']

@@ -30,8 +30,8 @@ def test_a_truncated_text_is_its_beginning_on_one_line(text, most):
 
 @pytest.mark.parametrize('text, said', [
     ('no\n such \x00', r'no such \x00'), (7, '7'),
-    (f' {"x" * 299}\n{"y" * 300} ', f'{"x" * 299} {"y" * 296}...'),
-    ('ab ' * 2000, ('ab ' * 2000)[:3997] + '...')])
+    (f' {"x" * 599}\n{"y" * 600} ', f'{"x" * 599} {"y" * 596}...'),
+    ('ab ' * 7000, ('ab ' * 7000)[:19997] + '...')])
 def test_a_sentence_is_one_line_of_words_of_limited_length(text, said):
     assert sentence(text) == said
 

@@ -9,7 +9,7 @@ import numpy as np
 
 TOLERANCE = 1e-9
 STEP = 1e-7
-MOST_STEPS = 20
+MAX_STEPS = 20
 
 
 class Loops:
@@ -54,7 +54,7 @@ class Loops:
         self._places[self._pin] = self._centre + self._radius * np.array(
             [math.cos(theta), math.sin(theta)])
         unknown = self._places[self._free].ravel()
-        for _ in range(MOST_STEPS):
+        for _ in range(MAX_STEPS):
             misfit = self._misfit(unknown)
             if np.abs(misfit).max() < TOLERANCE * self._size:
                 break

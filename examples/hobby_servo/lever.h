@@ -122,10 +122,10 @@ LKR_FORMULA lkr_real lkr_turns(lkr_real x, lkr_real turn)
         : turn * LKR_MATH(floor)(x / turn + (lkr_real)0.5);
 }
 
-/* x within half a turn of 0. */
-LKR_FORMULA lkr_real lkr_wrapped(lkr_real x, lkr_real turn)
+/* x in the turn nearest to `near`. */
+LKR_FORMULA lkr_real lkr_near(lkr_real x, lkr_real near, lkr_real turn)
 {
-    return x - lkr_turns(x, turn);
+    return x - lkr_turns(x - near, turn);
 }
 
 /* A limit that is missed by rounding counts as reached. */
@@ -240,7 +240,7 @@ static inline lkr_real lkr_gap(const lkr_model *model, int side, const lkr_real 
     int i;
     for (i = 0; i < model->inputs; i++) {
         const lkr_axis *axis = &model->axis[side][i];
-        gap[i] = lkr_wrapped(position[i] - p->position[side][i], axis->turn);
+        gap[i] = lkr_near(position[i] - p->position[side][i], 0, axis->turn);
         sum += LKR_MATH(fabs)(gap[i]) * axis->scale;
     }
     return sum;
@@ -303,7 +303,7 @@ static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, l
     int i, k, solutions = 0;
     for (k = 0; k < count && solutions < LKR_MAX_SOLUTIONS; k++) {
         const lkr_piece *part = &piece[k];
-        const lkr_real gap = lkr_wrapped(value - LKR_FROM_FLASH(part->middle), turn);
+        const lkr_real gap = lkr_near(value - LKR_FROM_FLASH(part->middle), 0, turn);
         if (LKR_MATH(fabs)(gap) <= LKR_FROM_FLASH(part->reach) + LKR_CLOSE * size) {
             const lkr_real square =
                 gap * LKR_FROM_FLASH(part->scale) + LKR_FROM_FLASH(part->shift);
@@ -492,6 +492,7 @@ static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, cons
 {
     lkr_real q[LKR_MAX_INPUTS], gap[LKR_MAX_INPUTS];
     lkr_point p = m->point;
+    int i;
     if (!lkr_are_finite(model->inputs, position)) {
         return LKR_NOT_KNOWN;
     }
@@ -501,6 +502,14 @@ static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, cons
             || lkr_bring(model, side, m->q, q) != 0)
         && !lkr_inverse(model, side, position, m->q, 1, q, &p)) {
         return LKR_OUT_OF_REACH;
+    }
+    for (i = 0; side == LKR_JOINTS && i < model->inputs; i++) {
+        /* An actuator goes on in the turn in which it is. */
+        const lkr_real near = m->held[LKR_ACTUATORS].position[i];
+        if (isfinite(near)) {
+            p.position[LKR_ACTUATORS][i] =
+                lkr_near(p.position[LKR_ACTUATORS][i], near, model->axis[LKR_ACTUATORS][i].turn);
+        }
     }
     m->is_known = 1;
     m->point = p;

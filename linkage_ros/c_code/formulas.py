@@ -73,7 +73,7 @@ class Formulas:
 
     def function(self) -> str:
         """Return the function for all fields and their rates."""
-        structure, groups = self._linkage.structure, [*self._groups()]
+        structure, groups = self._linkage.formulas, [*self._groups()]
         by = dict(zip(self.by, self._mechanism.scales))
         poses = [(f'/* {comment(about)} */', self._assigned(
             outputs, {'p': 1.0}, map(structure.output, outputs))) for about, outputs in groups]

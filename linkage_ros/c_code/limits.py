@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Limits of the commanded joints that follow from the sweeps and the reach."""
+"""Limits of actuators and joints that follow from the sweeps and the reach."""
+
+from __future__ import annotations
 
 import math
 from typing import Iterator, Sequence
@@ -18,22 +20,42 @@ SAMPLES = 200_000
 
 def lines(mechanism: SceneMechanism, names: Sequence[str] = ()) -> Iterator[str]:
     """Yield each commanded joint with its limits as an element of a URDF; see `axes.joints`."""
+    for axis in joints(mechanism, names):
+        found = ends(mechanism, axis)
+        limit = f'<limit lower="{found[0]!r}" upper="{found[1]!r}"/>' if found else \
+            '<!-- it turns without an end: continuous -->'
+        yield f'<joint name={quoteattr(axis.name)}>{limit}</joint>'
+
+
+def middle(mechanism: SceneMechanism, axis: Axis) -> float:
+    """Return the middle of positions that pass half a turn from zero, but do not turn; else 0."""
+    low, high = axis.turn and ends(mechanism, axis) or (0.0, 0.0)
+    return 0.5 * (low + high) if max(-low, high) > 0.5 * axis.turn else 0.0
+
+
+def ends(mechanism: SceneMechanism, axis: Axis) -> tuple[float, float] | None:
+    """
+    Return the lowest and the highest position of an actuator or a joint; None if it turns on.
+
+    If it does not count turns, their middle is within half a turn of zero.
+    """
     linkage, inputs = mechanism.linkage, mechanism.inputs
     # The arcs of each input, in the linkage's own units.
     arcs = [np.divide(settings.arcs, mechanism.scale_of(name))
             for name, settings in inputs.items()]
-    for axis in joints(mechanism, names):
-        values = np.array(linkage.extremes(axis.output, arcs[0].tolist()))[..., 0] if len(
-            arcs) == 1 else _values(mechanism, axis, arcs)
-        low, high = sorted(float(axis.factor * end + axis.offset)
-                           for end in (np.nanmin(values), np.nanmax(values)))
-        # What counts turns may do so in a sweep only.
-        turns = axis.turn or linkage.is_angle(axis.output) and not any(
-            settings.ends for settings in inputs.values())
-        is_turning = turns and high - low >= math.tau * abs(axis.factor) * (1.0 - 1e-9)
-        limit = '<!-- it turns without an end: continuous -->' if is_turning else \
-            f'<limit lower="{low!r}" upper="{high!r}"/>'
-        yield f'<joint name={quoteattr(axis.name)}>{limit}</joint>'
+    values = np.array(linkage.extremes(axis.output, arcs[0].tolist()))[..., 0] if len(
+        arcs) == 1 else _values(mechanism, axis, arcs)
+    if np.isnan(values).all():
+        raise ValueError(f'{mechanism.name} cannot be assembled in its sweep')
+    low, high = sorted(float(axis.factor * end + axis.offset)
+                       for end in (np.nanmin(values), np.nanmax(values)))
+    # What counts turns may do so in a sweep only.
+    turns = axis.turn or linkage.is_angle(axis.output) and not any(
+        settings.ends for settings in inputs.values())
+    if turns and high - low >= math.tau * abs(axis.factor) * (1.0 - 1e-9):
+        return None
+    away = axis.turn and axis.turn * round(0.5 * (low + high) / axis.turn)
+    return low - away, high - away
 
 
 def _values(mechanism: SceneMechanism, axis: Axis, arcs: Sequence[np.ndarray]) -> np.ndarray:

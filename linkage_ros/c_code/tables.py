@@ -16,6 +16,7 @@ from typing import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from . import limits
 from .axes import Axis, loads, start
 from .code import Code, indented
 from .formulas import Formulas
@@ -70,7 +71,7 @@ class Tables:
             'at': indented(self._at(rows, len(sides[1]))),
             'axes': row(row((1.0 / axis.size, axis.turn or math.inf)
                             for axis in axes) if axes else '{ { 0, 0 } }'
-                           for axes in rows),
+                        for axes in rows),
             'inputs': row(self._inputs(sides, has_sweeps=not tag)),
             'start': row(start(self.mechanism))})
 
@@ -85,8 +86,10 @@ class Tables:
                                     for struct in ('s', *formulas.by)]
                 if axis.offset:
                     position += f' + {code.literal(axis.offset)}'
-                if axis.wraps:
-                    position = f'lkr_wrapped({position}, {code.literal(axis.turn)})'
+                middle = limits.middle(self.mechanism, axis) if i < commanded and sides[0] else 0.0
+                if axis.wraps or middle:
+                    position = (f'lkr_near({position}, {code.literal(middle)}, '
+                                f'{code.literal(axis.turn)})')
                 yield f'p->position[{side}][{i}] = {position};'
                 yield from (f'p->rate[{side}][{i}][{j}] = {rate};' for j, rate in enumerate(rates))
                 needed += [f'p->position[{side}][{i}]'] * (i < commanded)
@@ -197,5 +200,5 @@ class Tables:
         inputs = (low + steps * (high - low)).ravel()
         found = linkage.bind(Program([x for x, in solutions])).over(
             *linkage.compiled_pose((), (output,)).over(inputs))
-        apart = linkage.inputs[0].apart(found, inputs)
+        apart = linkage.inputs[0].distance(found, inputs)
         return sorted({*np.where(np.isfinite(apart), apart, math.inf).argmin(axis=0).tolist()})

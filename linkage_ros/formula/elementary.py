@@ -24,7 +24,7 @@ PER_QUARTER = 0.6366197723675814
 # Sums with this number are rounded to integers.
 WHOLE = 1.5 * 2.0 ** 52
 # The C library computes larger angles.
-LARGEST_ANGLE = 2.0 ** 15 * QUARTER[0]
+MAX_ANGLE = 2.0 ** 15 * QUARTER[0]
 SINE = (-1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
         2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10)
 COSINE = (4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05,
@@ -39,7 +39,7 @@ ARCTANGENT_STARTS = ((0.4375, 0.5, 4.63647609000806093515e-01, 2.269877745296168
 # pi - math.pi.
 REST_OF_PI = 1.2246467991473532e-16
 # Between these, halves are exact and sums are finite.
-LEAST_HALVED, MOST_ADDED = 2.0 ** -1000, 2.0 ** 1000
+MIN_HALVED, MAX_ADDED = 2.0 ** -1000, 2.0 ** 1000
 
 
 def sine_and_cosine(x: Real) -> tuple[Real, Real, Real]:
@@ -52,7 +52,7 @@ def sine_and_cosine(x: Real) -> tuple[Real, Real, Real]:
     crossed = abs(abs(quarter) - 1.0) < 0.5
     return (_signed(where(crossed, cosine, sine), abs(quarter - 0.5) < 1.0),
             _signed(where(crossed, sine, cosine), abs(quarter + 0.5) < 1.0),
-            abs(x) <= LARGEST_ANGLE)
+            abs(x) <= MAX_ANGLE)
 
 
 def _rounded(x: Real) -> Real:
@@ -101,16 +101,16 @@ def arctangent(y: Real, x: Real) -> tuple[Real, Real]:
     steep = width < height
     low, high = where(steep, width, height), where(steep, height, width)
     numerator, denominator, start, rest = low, high, real(0.0), real(0.0)
-    for least, slope, own, after in ARCTANGENT_STARTS:
-        beyond = least * high < low
-        numerator = where(beyond, low - slope * high, numerator)
-        denominator = where(beyond, high + slope * low, denominator)
-        start, rest = where(beyond, own, start), where(beyond, after, rest)
+    for slope_limit, slope, angle_start, rest_start in ARCTANGENT_STARTS:
+        is_above = slope_limit * high < low
+        numerator = where(is_above, low - slope * high, numerator)
+        denominator = where(is_above, high + slope * low, denominator)
+        start, rest = where(is_above, angle_start, start), where(is_above, rest_start, rest)
     ratio = numerator / denominator
     square = ratio * ratio
     angle = start - ((ratio * (square * _polynomial(ARCTANGENT, square)) - rest) - ratio)
     angle = where(steep, math.pi / 2 - (angle - REST_OF_PI / 2), angle)
     angle = where(x < 0.0, math.pi - (angle - REST_OF_PI), angle)
     # The C library handles infinities and signs of zeros.
-    valid = where(high > LEAST_HALVED, where(high < MOST_ADDED, height, 0.0), 0.0) > 0.0
+    valid = where(high > MIN_HALVED, where(high < MAX_ADDED, height, 0.0), 0.0) > 0.0
     return _signed(angle, y > 0.0), valid

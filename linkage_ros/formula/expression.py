@@ -146,8 +146,8 @@ _LEAVES = frozenset({'constant', 'dimension', 'argument'})
 def operation(name: str, *operands: Real) -> Real:
     """Return an operation of `operations` on operands, evaluated at once if possible."""
     row = OPERATIONS[name]
-    if row.folded and (found := row.folded(*operands)) is not None:
-        return real(found)
+    if row.folded and (folded := row.folded(*operands)) is not None:
+        return real(folded)
     return Real(name, operands, positive=bool(row.positive) and False not in [
         operands[i].positive for i in row.positive])
 

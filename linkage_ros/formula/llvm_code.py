@@ -76,7 +76,7 @@ class Builder(ir.IRBuilder):
         return self.call(function, operands)
 
     @contextmanager
-    def each(self, last: ir.Value, first: ir.Value, step: int) -> Iterator[ir.Value]:
+    def loop(self, last: ir.Value, first: ir.Value, step: int) -> Iterator[ir.Value]:
         """Write a loop over the integers from `first` to `last`, exclusive; yield the integer."""
         before = self.block
         head, body, end = (self.function.append_basic_block() for _ in range(3))
@@ -106,15 +106,15 @@ class Loop:
         self._engine = compiled(_module(self.kind, operations, constants, outputs))
         self.run = SIGNATURE(self._engine.get_function_address('poses'))
 
-    def bound(self, given: Sequence[np.ndarray], constants: np.ndarray, out: np.ndarray
+    def bound(self, arguments: Sequence[np.ndarray], constants: np.ndarray, out: np.ndarray
               ) -> Callable:
         """
         Return the function that solves from a first pose to another, as long as the arrays live.
 
-        `given` are arrays (poses,); the results are written to `out` (outputs, poses).
+        `arguments` are arrays (poses,); the results are written to `out` (outputs, poses).
         """
-        places = (ctypes.c_int64 * len(given))(*map(_address, given))
-        rest = given[0].size, places, _address(constants), _address(out)
+        places = (ctypes.c_int64 * len(arguments))(*map(_address, arguments))
+        rest = arguments[0].size, places, _address(constants), _address(out)
         return lambda first, last: self.run(first, last, *rest)
 
 
@@ -157,8 +157,8 @@ def _address(array: np.ndarray) -> int:
 
 def _cores() -> int:
     """Return the number of cores that this process may use."""
-    own = getattr(os, 'sched_getaffinity', None)
-    return len(own(0)) if own else os.cpu_count() or 1
+    affinity = getattr(os, 'sched_getaffinity', None)
+    return len(affinity(0)) if affinity else os.cpu_count() or 1
 
 
 @cached(1)
@@ -182,7 +182,7 @@ def _module(kind: ir.Type, operations: Sequence, constants: Sequence[int],
     def numbers(array: ir.Value, offset: ir.Value) -> ir.Value:
         return builder.bitcast(builder.gep(array, [offset]), kind.as_pointer())
 
-    with builder.each(last, first, lanes) as i:
+    with builder.loop(last, first, lanes) as i:
         # The last vector may overlap the one before.
         latest = builder.sub(size, _count(lanes))
         at = builder.select(builder.icmp_signed('<', i, latest), i, latest)
@@ -231,8 +231,8 @@ def _approximated(builder: Builder, spell: dict[str, Callable], approximation: C
         known: dict[int, ir.Value] = {}
         _append(operations, known, spell, VECTOR, lambda index: operands[index])
         *near, holds = (known[number] for number in outputs)
-        whole, before = builder.bitcast(holds, ir.IntType(LANES)), builder.block
-        with builder.if_then(builder.icmp_unsigned('!=', whole, whole.type(-1)), likely=False):
+        bits, before = builder.bitcast(holds, ir.IntType(LANES)), builder.block
+        with builder.if_then(builder.icmp_unsigned('!=', bits, bits.type(-1)), likely=False):
             far = [builder.select(holds, value, exact(*operands))
                    for value, exact in zip(near, library)]
             beyond = builder.block

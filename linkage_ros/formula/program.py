@@ -226,7 +226,7 @@ class CompiledFunction:
         return self.variant.float(*self.constants, self._quietly)
 
     @cached_property
-    def _given(self) -> np.ndarray:
+    def _constant_array(self) -> np.ndarray:
         return np.array(self.constants)
 
     def _quietly(self, *arguments: float) -> tuple:
@@ -265,8 +265,8 @@ class CompiledFunction:
         flat = [a.ravel() for a in (first, *others)]
         return solve(flat, first.size).reshape(self.variant.outputs, *first.shape)
 
-    def _in_machine_code(self, given: Sequence[np.ndarray], _: int) -> np.ndarray:
-        return self.variant.arrays.solve(given, self._given)
+    def _in_machine_code(self, arguments: Sequence[np.ndarray], _: int) -> np.ndarray:
+        return self.variant.arrays.solve(arguments, self._constant_array)
 
     def batch(self, rows: np.ndarray) -> Batch:
         """
@@ -276,23 +276,23 @@ class CompiledFunction:
         """
         with needs('llvmlite'):
             from . import llvm_code  # noqa: F401
-        return Batch(self.variant.loop, self._given, self.variant.arguments, rows)
+        return Batch(self.variant.loop, self._constant_array, self.variant.arguments, rows)
 
-    def _in_python(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
+    def _in_python(self, arguments: Sequence[np.ndarray], size: int) -> np.ndarray:
         if size >= FEW_POSES:
-            return self._blocks(given, size)
-        poses = map(self.at, *(a.tolist() for a in given))
+            return self._blocks(arguments, size)
+        poses = map(self.at, *(a.tolist() for a in arguments))
         outputs = self.variant.outputs
         return np.fromiter(chain.from_iterable(poses), float, size * outputs).reshape(
             size, outputs).T
 
-    def _blocks(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
+    def _blocks(self, arguments: Sequence[np.ndarray], size: int) -> np.ndarray:
         pose = self.variant.array(*self.constants)
         out = np.empty((self.variant.outputs, size))
         with np.errstate(all='ignore'):
             for start in range(0, size, BLOCK_OF_POSES):
                 block = slice(start, start + BLOCK_OF_POSES)
-                for row, values in zip(out, pose(*(a[block] for a in given))):
+                for row, values in zip(out, pose(*(a[block] for a in arguments))):
                     row[block] = values
         return out
 

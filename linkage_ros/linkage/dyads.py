@@ -175,7 +175,7 @@ class Dyads:
         """Return an angle [rad] as 0 to 3 quarter turns; None if the line has the angle itself."""
         return None
 
-    def special_line(self, place: complex, other: complex, one: Pin, two: Pin) -> str | None:
+    def special_line(self, place: complex, other: complex, first: Pin, second: Pin) -> str | None:
         """Return a more specific line than `dyad` for two bars, or None."""
         return None
 
@@ -200,7 +200,7 @@ class Dyads:
         self.on[body][name] = place
         for pin in self.pins:
             if body in pin and abs(pin[body] - place) < self.near:
-                self.on.update({each: {**self.on[each], name: at} for each, at in pin.items()})
+                self.on.update({link: {**self.on[link], name: at} for link, at in pin.items()})
         self.lines.append(f'{name} {line}')
         return name
 
@@ -346,20 +346,20 @@ class Dyads:
 
     def _dyad(self, first: str) -> bool:
         for second, pin in self.rods(first) if self.on[first] else ():
-            one, two = self.end(first), self.end(second)
-            if one[0] == two[0] or any(
+            start, end = self.end(first), self.end(second)
+            if start[0] == end[0] or any(
                     {first, second} == {*motor.bodies} for motor in self.motors):
                 continue
-            ends = self.place_in_pose(first, one[1]), self.place_in_pose(second, two[1])
+            ends = self.place_in_pose(first, start[1]), self.place_in_pose(second, end[1])
             if abs(ends[0] - ends[1]) < self.near:
                 raise ValueError(f'{first} and {second} are folded onto each other')
             side = self._side(*ends, self.place_in_pose(first, pin[first]))
-            line = self.special_line(pin[first], pin[second], one, two) or (
-                f'dyad {one[0]} {two[0]} {self.length_text(abs(pin[first] - one[1]))} '
-                f'{self.length_text(abs(pin[second] - two[1]))} {side}')
+            line = self.special_line(pin[first], pin[second], start, end) or (
+                f'dyad {start[0]} {end[0]} {self.length_text(abs(pin[first] - start[1]))} '
+                f'{self.length_text(abs(pin[second] - end[1]))} {side}')
             name = self.name(pin[first], first, line)
-            return self.place_on_joint(first, one[0], name) and self.place_on_joint(
-                second, two[0], name)
+            return self.place_on_joint(first, start[0], name) and self.place_on_joint(
+                second, end[0], name)
         return False
 
     def _slider(self, slide: Slide, way: int) -> bool:

@@ -101,9 +101,9 @@ class LinkageFormulas:
     def program(self, kind: str, names: Any, *by: int) -> Program:
         """Return the code for outputs of one kind, without operations that they do not need."""
         # An acceleration also depends on the inputs' speeds, and on how these change.
-        given = (3 if kind.endswith('accelerations') else 1) * len(self.built.inputs)
+        arguments = (3 if kind.endswith('accelerations') else 1) * len(self.built.inputs)
         return self._programs.get_or_make(
-            (kind, names, *by), lambda: Program(self._outputs[kind](names, *by), given))
+            (kind, names, *by), lambda: Program(self._outputs[kind](names, *by), arguments))
 
     def legs(self, points: Points, joints: Names, moving: Names) -> Program:
         """Return the code for one of several legs; see `Mechanism.legs`."""
@@ -153,8 +153,8 @@ class LinkageFormulas:
     def parts(self, names: tuple[Names, ...]) -> list[Real]:
         """Return coordinates of points, joint angles, and joint rates by each input."""
         points, joints, rates = names
-        turning = [self._rates(rates, by) for by in range(len(self.built.inputs))]
-        return [*self._points(points), *self._angles(joints), *chain.from_iterable(turning)]
+        rates_by_input = [self._rates(rates, by) for by in range(len(self.built.inputs))]
+        return [*self._points(points), *self._angles(joints), *chain.from_iterable(rates_by_input)]
 
     def checked(self, names: Names) -> list[Real]:
         """Return outputs and their rates by each input, NaN unless all joints are assembled."""
@@ -173,18 +173,18 @@ class LinkageFormulas:
         across = leg.side * leg.size
         factors = (across, leg.size, leg.size)[:len(self.built.axes)]
         replaced = {
-            old: leg.start + leg.side * (value - leg.lag) if input_.turns else value / leg.size
+            old: leg.start + leg.side * (value - leg.lag) if input_.is_angle else value / leg.size
             for old, value, input_ in zip(self.built.arguments, values, inputs)}
-        turning = [sum((rate * (speed if input_.turns else speed / leg.size)
-                        for rate, speed, input_ in zip(rates, speeds, inputs)), real(0.0))
-                   for rates in zip(*(self._rates(moving, by) for by in range(len(inputs))))]
+        joint_rates = [sum((rate * (speed if input_.is_angle else speed / leg.size)
+                            for rate, speed, input_ in zip(rates, speeds, inputs)), real(0.0))
+                       for rates in zip(*(self._rates(moving, by) for by in range(len(inputs))))]
         # A mirrored leg's own crank turns backwards, which changes the sign of its rates.
         outputs = [*(part * factor for part, factor in zip(self._points(points),
                                                            cycle(factors))),
                    *(value * (across if self._slides(name) else leg.side)
                      for name, value in zip(joints, self._angles(joints))),
                    *(value * leg.size if self._slides(name) else value
-                     for name, value in zip(moving, turning))]
+                     for name, value in zip(moving, joint_rates))]
         return Program(outputs, len(arguments), replaced)
 
     def _slides(self, name: str) -> bool:
@@ -221,8 +221,8 @@ class LinkageFormulas:
             return derivative(expression, speeds, known)
 
         def turning(bar: Complex) -> Real:
-            turned = spin(bar)
-            return turned.formula(*map(d, turned.of))
+            rate = spin(bar)
+            return rate.formula(*map(d, rate.of))
 
         def rate(name: str) -> Real:
             # In space a joint turns about its own axis: there is no direction in a plane.
@@ -291,5 +291,5 @@ def _vanishes(rate: Real) -> bool:
 
 @cached(32, shared=True)
 def formulas_of(design: Design, branches: tuple[tuple[str, int], ...]) -> LinkageFormulas:
-    """Return the cached structure of a design with its branches."""
+    """Return the cached formulas of a design with its branches."""
     return LinkageFormulas(design, dict(branches))

@@ -24,7 +24,7 @@ ANGLE, LENGTH = 'angle', 'length'
 # [turns; fewer where a geared link is fast]. Of several inputs they are the product, the cost.
 MAX_PERIOD, PART = 100, 8
 # Greatest denominator of a gear ratio with a period, and greatest ratio.
-MOST_TURNS, FASTEST = 10 ** 6, 1000
+MAX_DENOMINATOR, MAX_GEAR_RATIO = 10 ** 6, 1000
 
 
 class Input(NamedTuple):
@@ -51,7 +51,7 @@ class Input(NamedTuple):
         return math.tau * self.period
 
     @property
-    def turns(self) -> bool:
+    def is_angle(self) -> bool:
         """Whether it is an angle."""
         return self.kind == ANGLE
 
@@ -78,7 +78,7 @@ class Input(NamedTuple):
     @property
     def is_part(self) -> bool:
         """Whether it is an angle of which only a part of the period is computed."""
-        return self.turns and not self.wraps
+        return self.is_angle and not self.wraps
 
     def whole_turns(self, near: float) -> float:
         """Return the turns around which values are computed, if not those around zero."""
@@ -111,13 +111,13 @@ class Input(NamedTuple):
         """Return a value plus the whole turns that bring it closest to another one."""
         return value + self.turn * round((seed - value) / self.turn) if self.wraps else value
 
-    def apart(self, value: Any, other: Any) -> Any:
+    def distance(self, value: Any, other: Any) -> Any:
         """Return the differences of values and others, without whole turns."""
         return abs(self.wrapped(value - other))
 
     def is_whole(self, arcs: Sequence[Arc]) -> bool:
         """Return whether some arcs are a full rotation, or all that is computed of one."""
-        return self.turns and len(arcs) == 1 and arcs[0][1] - arcs[0][0] >= min(
+        return self.is_angle and len(arcs) == 1 and arcs[0][1] - arcs[0][0] >= min(
             self.turn, self.high - self.low)
 
     def is_cut(self, value: float) -> bool:
@@ -156,13 +156,13 @@ class Input(NamedTuple):
 
     def distinct(self, values: Iterable[float]) -> list[float]:
         """Return values in order, wrapped, one of those that differ by rounding."""
-        found: list[float] = []
+        distinct: list[float] = []
         for x in sorted(float(self.wrapped(0.0 if abs(x) < MIN_ANGLE else x)) for x in values):
-            if not found or x - found[-1] > ONE:
-                found.append(x)
-        if self.wraps and len(found) > 1 and found[0] + self.turn - found[-1] <= ONE:
-            found.pop()
-        return found
+            if not distinct or x - distinct[-1] > ONE:
+                distinct.append(x)
+        if self.wraps and len(distinct) > 1 and distinct[0] + self.turn - distinct[-1] <= ONE:
+            distinct.pop()
+        return distinct
 
     def between(self, ends: Iterable[float]) -> list[Arc]:
         """Return the arcs between values, in order; the last of a turn ends where it began."""

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from .formulas import formulas_of, LinkPoint, Points
 from .geometry.spatial import IN_SINGLE
-from .inputs import FASTEST, Input, MAX_PERIOD, MOST_TURNS, PART, spread
+from .inputs import Input, MAX_DENOMINATOR, MAX_GEAR_RATIO, MAX_PERIOD, PART, spread
 from .text import joint_lines
 from .text.arguments import checked_branches, checked_dimensions, numbers
 from .text.design import Design
@@ -35,7 +35,7 @@ OF_POINTS = 'points', 'velocities', 'point accelerations'
 # each is at another angle.
 COMPARED = 66
 
-Own = TypeVar('Own', bound='Kinematics')
+Same = TypeVar('Same', bound='Kinematics')
 # One input, or a sequence of several; each a number or an array [rad or m].
 Inputs = ArrayLike | Sequence[ArrayLike]
 Names = Sequence[str] | None
@@ -64,14 +64,14 @@ class Kinematics:
         self.shape = np.broadcast_shapes(*map(np.shape, self.dimensions.values()))
         self.is_accelerated = accelerate
         # Equal linkages share it, including unpickled ones.
-        self.structure = formulas_of(design, tuple(self.branches.items()))
-        built = self.structure.built
+        self.formulas = formulas_of(design, tuple(self.branches.items()))
+        built = self.formulas.built
         self.points, self.joints = tuple(built.points), tuple(built.joint_values)
         self.grounded, self.axes = built.grounded, built.axes
         self.bars = tuple((bar.first, bar.second) for bar in built.bars)
         self.cylinders, self.yokes = tuple(built.cylinders), dict(built.yokes)
         self._evaluated: dict = {}
-        evaluate_in_order(self.structure.constants, self.dimensions, self._evaluated)
+        evaluate_in_order(self.formulas.constants, self.dimensions, self._evaluated)
         self._poses, self.cache = Cache(), Cache()
         self.inputs = tuple(map(self._with_limits, range(len(built.inputs)), built.inputs))
         input_names = {input_.name for input_ in self.inputs}
@@ -80,8 +80,8 @@ class Kinematics:
                            for link in built.links)
 
     def __reduce__(self) -> tuple:
-        given = dict(self.dimensions), dict(self.branches)
-        return type(self), (self.design, *given, self.is_accelerated)
+        values = dict(self.dimensions), dict(self.branches)
+        return type(self), (self.design, *values, self.is_accelerated)
 
     def __repr__(self) -> str:
         lengths = ', '.join(f'{k}={v}' for k, v in self.dimensions.items())
@@ -93,7 +93,7 @@ class Kinematics:
     def bar_lengths(self) -> Mapping:
         """Return the length [m] of each bar."""
         return MappingProxyType({(bar.first, bar.second): self._number(bar.length)
-                                 for bar in self.structure.built.bars})
+                                 for bar in self.formulas.built.bars})
 
     @cached_property
     def frames(self) -> Mapping:
@@ -101,7 +101,7 @@ class Kinematics:
         return MappingProxyType({
             link: {name: tuple(map(self._number, (place.x, place.y)))
                    for name, place in frame.items()}
-            for link, frame in self.structure.built.frames.items()})
+            for link, frame in self.formulas.built.frames.items()})
 
     @property
     def longest(self) -> Any:
@@ -129,7 +129,7 @@ class Kinematics:
 
     def windows(self) -> list:
         """Return the links on two hinges in a row with two rods, and their limits."""
-        return [self.constants(window) for window in self.structure.built.windows]
+        return [self.constants(window) for window in self.formulas.built.windows]
 
     def value(self, length: Real) -> Any:
         """Return the value of an expression of dimensions alone."""
@@ -146,7 +146,7 @@ class Kinematics:
         """Raise ValueError, with the joint line, if its dimensions are not allowed."""
         if self.design.is_written:
             joint_lines.check_numbers(self.design, self.dimensions)
-        for line, amount, problem in self.structure.built.demands:
+        for line, amount, problem in self.formulas.built.demands:
             size = self.value(amount)
             # A triangle that does not exist is NaN; a type of the catalogue then has no pose.
             allowed = (size > 0.0) & (size < math.inf) | (
@@ -156,12 +156,12 @@ class Kinematics:
         for window in self.windows():
             window.check()
         for by, input_ in enumerate(self.inputs):
-            for name in self.geared if input_.speed > FASTEST else ():
-                if (ratio := np.max(np.abs(self.gear(name, by)[0]))) > FASTEST:
+            for name in self.geared if input_.speed > MAX_GEAR_RATIO else ():
+                if (ratio := np.max(np.abs(self.gear(name, by)[0]))) > MAX_GEAR_RATIO:
                     raise ValueError(f'{self.type}: {name} turns {ratio:g} times as fast as '
-                                     f'the {input_.name}; allowed: {FASTEST} times')
+                                     f'the {input_.name}; allowed: {MAX_GEAR_RATIO} times')
 
-    def with_dimensions(self: Own, /, **changed: ArrayLike) -> Own:
+    def with_dimensions(self: Same, /, **changed: ArrayLike) -> Same:
         """Return a copy with other dimensions [m]; raises ValueError as `create` does."""
         made = type(self)(
             self.design, checked_dimensions(self.design, {**self.dimensions, **changed}),
@@ -169,7 +169,7 @@ class Kinematics:
         made.check()
         return made
 
-    def driven_by(self: Own, *outputs: str, branches: Mapping[str, int] | None = None) -> Own:
+    def driven_by(self: Same, *outputs: str, branches: Mapping[str, int] | None = None) -> Same:
         """
         Return a linkage in space with other joints as its inputs.
 
@@ -188,7 +188,7 @@ class Kinematics:
         made.check()
         return made
 
-    def turned(self: Own, *turns: float) -> Own:
+    def turned(self: Same, *turns: float) -> Same:
         """
         Return the same linkage, each input counted from so many whole turns on.
 
@@ -201,7 +201,7 @@ class Kinematics:
             replace(self.design, turned=counts), self.dimensions, self.branches,
             self.is_accelerated))
 
-    def accelerated(self: Own) -> Own:
+    def accelerated(self: Same) -> Same:
         """
         Return a copy that solves arrays by compiled code, large ones on all cores.
 
@@ -227,28 +227,28 @@ class Kinematics:
 
     def _ratios(self, by: int) -> list[float]:
         """Return the turns of each driven link per turn of an input."""
-        each = [np.ravel(self.value(derivative(value, {by: 1.0}, {})))
-                for _, value in self.structure.built.driven.values()]
-        return [float(ratio) for ratios in each for ratio in ratios if math.isfinite(ratio)]
+        rates = [np.ravel(self.value(derivative(value, {by: 1.0}, {})))
+                 for _, value in self.formulas.built.driven.values()]
+        return [float(ratio) for rate in rates for ratio in rate if math.isfinite(ratio)]
 
-    def _period(self, by: int, ratios: Sequence[float], most: float) -> float:
-        fractions = [Fraction(ratio).limit_denominator(MOST_TURNS) for ratio in ratios]
+    def _period(self, by: int, ratios: Sequence[float], limit: float) -> float:
+        fractions = [Fraction(ratio).limit_denominator(MAX_DENOMINATOR) for ratio in ratios]
         if any(abs(float(fraction) - ratio) > 4.0 * math.ulp(ratio)
                for fraction, ratio in zip(fractions, ratios)):
             return math.inf
         turns = math.lcm(*(fraction.denominator for fraction in fractions))
-        if turns > most or not self._passes_change_point(by) or self.repeats(
+        if turns > limit or not self._passes_change_point(by) or self.repeats(
                 by, turns, 'angles', self.coordinates, math.pi * turns):
             return turns
         return 2 * turns
 
     def _passes_change_point(self, by: int) -> bool:
         """Return whether a dyad of a crank has a gap of nothing but rounding."""
-        gaps = [(limit.tolerance, *limit.ends[:2]) for limit in self.structure.built.limits
-                if limit.ends and limit.ends.theta.args[0] == by]
-        values = [tuple(map(self.value, each)) for each in gaps]
+        margins = [(limit.tolerance, *limit.ends[:2]) for limit in self.formulas.built.limits
+                   if limit.ends and limit.ends.theta.args[0] == by]
+        values = [tuple(map(self.value, margin)) for margin in margins]
         return not self.shape and any(min(abs(start), abs(end)) <= tolerance
-                                         for tolerance, start, end in values)
+                                      for tolerance, start, end in values)
 
     def repeats(self, by: int, turns: float, kind: str, outputs: tuple[str, ...], high: float,
                 middles: ArrayLike = ()) -> bool:
@@ -259,7 +259,7 @@ class Kinematics:
         """
         now = np.append(high * np.linspace(-1.0, 1.0, COMPARED + 2)[1:-1], middles)
         later = now + math.tau * turns
-        inputs = spread([self._with_stroke(x) for x in self.structure.built.inputs], len(now))
+        inputs = spread([self._with_stroke(x) for x in self.formulas.built.inputs], len(now))
         pose, rows = self.compiled(kind, outputs), []
         for inputs[by] in (now, later):
             # As directions: angles are the same up to whole turns.
@@ -269,21 +269,21 @@ class Kinematics:
 
     def _with_limits(self, by: int, input_: Input) -> Input:
         """Return an input with the limits [rad or m] of all poses."""
-        if not input_.turns:
+        if not input_.is_angle:
             return self._with_stroke(input_)
         ratios = self._ratios(by)
         input_ = input_._replace(speed=max(1.0, *map(abs, ratios)))
-        most, part = (input_.step * turns ** (1.0 / len(self.structure.built.inputs))
-                      for turns in (MAX_PERIOD, PART))
-        period = self._period(by, ratios, most)
+        limit, part = (input_.step * turns ** (1.0 / len(self.formulas.built.inputs))
+                       for turns in (MAX_PERIOD, PART))
+        period = self._period(by, ratios, limit)
         # After an odd number of turns a branch is another one past a change point; half of a part,
         # the distance of two, is an even number.
-        turns = period if period <= max(most, 1.0) else max(4.0, 4.0 * round(0.25 * part))
+        turns = period if period <= max(limit, 1.0) else max(4.0, 4.0 * round(0.25 * part))
         return input_._replace(low=-math.pi * turns, high=math.pi * turns, period=period)
 
     def _with_stroke(self, input_: Input) -> Input:
         """Return an input with its stroke [m]; an angle is unchanged."""
-        return input_ if input_.turns else input_._replace(
+        return input_ if input_.is_angle else input_._replace(
             low=self._number(input_.low), high=self._number(input_.high))
 
     # --- poses and how they change ---
@@ -330,8 +330,8 @@ class Kinematics:
         names, pose = self._ready('joint accelerations', joints)
         return dict(zip(names, pose.over(*self._motion(theta, rate, rate_rate))))
 
-    def _motion(self, *each: Inputs) -> Sequence[np.ndarray]:
-        return [values for name, inputs in zip(('theta', 'rate', 'rate_rate'), each)
+    def _motion(self, *derivatives: Inputs) -> Sequence[np.ndarray]:
+        return [values for name, inputs in zip(('theta', 'rate', 'rate_rate'), derivatives)
                 for values in self.each_input(inputs, name)]
 
     def transmission_angles(self, theta: Inputs, joints: Names = None) -> dict:
@@ -364,7 +364,7 @@ class Kinematics:
             raise ValueError('a function is for one set of dimensions, not for arrays')
         if xp is None:
             return self.compiled_pose(points, joints, rates).at
-        outputs = self.structure.parts(self._requested(points, joints, rates))
+        outputs = self.formulas.parts(self._requested(points, joints, rates))
         return array_function(outputs, len(self.inputs), xp, self.dimensions, IN_SINGLE)
 
     def compiled_pose(self, points: Names = None, joints: Sequence[str] = (),
@@ -394,7 +394,7 @@ class Kinematics:
         places = {name: value for point, names in zip(points, named)
                   if isinstance(point, LinkPoint) for name, value in zip(names[1:], point[1:])}
         return self.cache.get_or_make(('legs', points, joints, moving), lambda: (
-            self.structure.legs(named, joints, moving).bind(
+            self.formulas.legs(named, joints, moving).bind(
                 {**self.dimensions, **places}, dict(self._evaluated), self.is_accelerated)))
 
     # --- outputs ---
@@ -407,16 +407,16 @@ class Kinematics:
         such as 'C.x' [m]; and, in a plane, 'distance(A,C)' [m] of two joints and 'angle(A,C)'
         [rad] from +x to A -> C.
         """
-        return isinstance(name, str) and self.structure.has(name)
+        return isinstance(name, str) and self.formulas.has(name)
 
     def is_angle(self, output: str) -> bool:
         """Return whether an output is an angle [rad], not a length [m]."""
         self.check_there(output)
-        return self.structure.is_angle(output)
+        return self.formulas.is_angle(output)
 
     def moves(self, output: str, by: int = 0) -> bool:
         """Return whether an output depends on one of the inputs."""
-        return isinstance(output, str) and self.structure.moves(output, self._checked_by(by))
+        return isinstance(output, str) and self.formulas.moves(output, self._checked_by(by))
 
     def check_output(self, output: str) -> None:
         """Raise ValueError if an output does not exist or does not move."""
@@ -429,16 +429,16 @@ class Kinematics:
         """Raise ValueError if an output does not exist."""
         if not self.has_output(output):
             named = (*self.joints, *self.coordinates)
-            own = [x for x in self.coordinates if isinstance(output, str) and output == x[:-2]]
+            xy = [x for x in self.coordinates if isinstance(output, str) and output == x[:-2]]
             pairs = 'distance(A,B) and angle(A,B) of two joints, ' * (self.axes == 'xy')
             raise ValueError(
                 f'{self.type} has no output {short_repr(output)}; allowed: {pairs}'
                 + join_names(named) + (
-                    f'; did you mean {join_names(own)}?' if own else did_you_mean(output, named)))
+                    f'; did you mean {join_names(xy)}?' if xy else did_you_mean(output, named)))
 
     def gear(self, name: str, by: int = 0) -> tuple[float, float]:
         """Return ratio and offset [rad or m] by which an input drives a link, anywhere."""
-        _, value = self.structure.built.driven[name]
+        _, value = self.formulas.built.driven[name]
         program = Program([derivative(value, {by: 1.0}, {}), value], len(self.inputs))
         ratio, offset = self.bind(program).at(*[0.0] * len(self.inputs))
         return ratio, offset
@@ -456,7 +456,7 @@ class Kinematics:
 
     def compiled(self, kind: str, names: Any, *by: int) -> CompiledFunction:
         """Return the code for quantities of one kind; see `LinkageFormulas.program`."""
-        return self.bind(self.structure.program(kind, names, *by))
+        return self.bind(self.formulas.program(kind, names, *by))
 
     def _vectors(self, kind: str, theta: Inputs, points: Any, *by: int) -> dict:
         names, pose = self._ready(kind, points, *by)
@@ -478,7 +478,7 @@ class Kinematics:
         if not hasattr(theta, '__len__') or len(theta) != len(self.inputs):
             raise ValueError(f'{self.type} has {n_inputs(len(self.inputs))}: '
                              f'{name} must be a sequence of as many values')
-        return [numbers(name, each) for each in theta]
+        return [numbers(name, values) for values in theta]
 
     def _checked_by(self, by: Any) -> int:
         """Return the index of an input; raise ValueError if it is invalid."""
@@ -501,7 +501,7 @@ class Kinematics:
     def _names(self, kind: str, requested: Any) -> tuple[str, ...]:
         what, allowed = ('point', self.points) if kind in OF_POINTS else ('joint', self.joints)
         if kind == 'transmissions':
-            what, allowed = 'transmission angle at', tuple(self.structure.built.transmissions)
+            what, allowed = 'transmission angle at', tuple(self.formulas.built.transmissions)
         if requested is None:
             return allowed
         # A subclass of str may print, or change, in its own way.

@@ -58,8 +58,8 @@ class Mechanism(Kinematics):
         Joint of the locus.
     is_accelerated : bool
         Whether compiled code solves arrays.
-    structure : LinkageFormulas
-        Formulas, for any dimensions.
+    formulas : LinkageFormulas
+        Its formulas, for any dimensions.
     cache : Cache
         Cached results: reach, inverses, travels.
 
@@ -119,8 +119,8 @@ class Mechanism(Kinematics):
             return inverse.nearest((value, *fixed), (near, *fixed))[0][0]
         if type(value) is not float and numbers('value', value).ndim:
             return inverse.over(value, *fixed)[0][0]
-        wanted: Any = (value, *fixed)
-        solutions = inverse.all(wanted)
+        values: Any = (value, *fixed)
+        solutions = inverse.all(values)
         return np.array([solution.inputs[0] for solution in solutions] or [math.nan])
 
     def _fixed(self, others: Any) -> tuple[float, ...]:
@@ -154,8 +154,8 @@ class Mechanism(Kinematics):
         See `Inverse.follow`, for a linkage with one input: the input [rad or m] with its whole
         turns, and d output / d input; NaN beyond the next dead point or extreme of the output.
         """
-        (found,), (rate,) = self.inverse(output).follow((value,), (near,))
-        return found, rate
+        (theta,), (rate,) = self.inverse(output).follow((value,), (near,))
+        return theta, rate
 
     def inputs_for(self, outputs: Sequence[str], values: ArrayLike,
                    near: ArrayLike | None = None) -> list[Solution]:
@@ -189,8 +189,8 @@ class Mechanism(Kinematics):
         """Return the distance of the first input to the nearest dead point [rad or m], or inf."""
         theta = numbers('theta', theta)
         with np.errstate(invalid='ignore'):  # of infinite angles
-            away = [self.inputs[0].apart(theta, dead) for dead in self.dead_points(*others)]
-        return np.min([np.full(np.shape(theta), np.inf), *away], axis=0)[()]
+            distances = [self.inputs[0].distance(theta, x) for x in self.dead_points(*others)]
+        return np.min([np.full(np.shape(theta), np.inf), *distances], axis=0)[()]
 
     def extremes(self, output: str, arcs: Sequence[Arc] | None = None,
                  others: Sequence[float] = ()) -> list:

@@ -49,8 +49,8 @@ def _powers(linkage: Kinematics, theta: Inputs, loads: Mapping[str, ArrayLike],
             # A zero load does no work, even at an infinite velocity.
             yield np.where(force == 0.0, 0.0, force * velocities[name]).sum(axis=-1)
         elif name in chains:
-            turning = sum((rates[link] for link in chains[name]), np.zeros(()))
-            yield np.where(force == 0.0, 0.0, force * turning)
+            rate = sum((rates[link] for link in chains[name]), np.zeros(()))
+            yield np.where(force == 0.0, 0.0, force * rate)
         else:
             raise ValueError(f'{linkage.type} has no joint or link {short_repr(name)} to load; '
                              f'allowed: {join_names((*linkage.points, *linkage.joints))}')

@@ -68,14 +68,14 @@ def checked_lines(joints: Any) -> tuple[str, ...]:
     try:
         # A set has no order, and of a mapping only the keys would be read.
         unfit = isinstance(joints, (str, bytes, Mapping, Set))
-        lines = () if unfit else tuple(islice(joints, joint_lines.MOST_LINES + 1))
+        lines = () if unfit else tuple(islice(joints, joint_lines.MAX_LINES + 1))
     except TypeError:
         lines = ()
     if not lines:
         raise ValueError(
             f'joints must be a list of lines, one per joint, got {short_repr(joints)}')
-    if len(lines) > joint_lines.MOST_LINES:
-        raise ValueError(f'joints must be up to {joint_lines.MOST_LINES} lines, got more')
+    if len(lines) > joint_lines.MAX_LINES:
+        raise ValueError(f'joints must be up to {joint_lines.MAX_LINES} lines, got more')
     for number, line in enumerate(lines, 1):
         if not isinstance(line, str):
             raise ValueError(

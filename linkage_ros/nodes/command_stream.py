@@ -112,8 +112,8 @@ class CommandStream:
     def _output(self, named: str) -> tuple[SceneMechanism, str, JointName] | None:
         """Return the mechanism, output and published name for a name in messages, or None."""
         for mechanism in self._mechanisms.values():
-            if found := mechanism.output_named(named):
-                return mechanism, *found
+            if output := mechanism.output_named(named):
+                return mechanism, *output
         return None
 
     def _targets(self, names: Sequence[str]) -> tuple[list[Target], list[str]]:

@@ -41,16 +41,16 @@ class Throttle:
 
 
 class Once:
-    """A record of logged subjects, so that each is logged once, and no more after `most`."""
+    """A record of logged subjects, so that each is logged once, and no more after `limit`."""
 
-    def __init__(self, most: int):
-        self._most = most
+    def __init__(self, limit: int):
+        self._limit = limit
         # Hashes, because names may be long.
         self._logged: set[int] = set()
 
     def new(self, subjects: Iterable[Hashable]) -> list[Any]:
-        """Return the subjects that no call has returned before; none after `most` subjects."""
-        if len(self._logged) >= self._most:
+        """Return the subjects that no call has returned before; none after `limit` of them."""
+        if len(self._logged) >= self._limit:
             return []
         new = [subject for subject in dict.fromkeys(subjects)
                if hash(subject) not in self._logged]
@@ -60,7 +60,7 @@ class Once:
     @property
     def ending(self) -> str:
         """Text that ends the warning which reaches the limit; empty before."""
-        return '; no more will be named' if len(self._logged) >= self._most else ''
+        return '; no more will be named' if len(self._logged) >= self._limit else ''
 
 
 class Incidents:

@@ -100,8 +100,8 @@ class MechanismModel:
                 serialize_message(messages.locus(*drawn, curve, size, self.mechanism.mirrored))
                 if len(curve) > 1 else None)
 
-    def _regular(self, wanted: tuple[bool, bool, bool]) -> AssemblyState:
-        joints, markers, moving = wanted
+    def _regular(self, parts: tuple[bool, bool, bool]) -> AssemblyState:
+        joints, markers, moving = parts
         # With several inputs, only the joint angles show whether the linkage is assembled.
         joints = joints or len(self.inputs) > 1
         names = self.assembly.joints if joints else ()
@@ -219,9 +219,9 @@ def _shown(mechanism: scene.SceneMechanism) -> tuple[Sequence, dict[int, list]]:
         id_ = (messages.GUIDES_ID if shape.kind == shapes.GUIDE else messages.DRIVEN_ID
                if shape.slide.name in mechanism.inputs else messages.BODIES_ID)
         pieces[id_].append((shape.start, shape.end))
-    points = (*names, *(point for several in pieces.values() for piece in several
-                        for point in piece if isinstance(point, LinkPoint)))
+    points = (*names, *(point for several in pieces.values() for line in several
+                        for point in line if isinstance(point, LinkPoint)))
     index = {point: i for i, point in enumerate(points)}
     return points, {
-        id_: [[index[point] for point in piece] for piece in several if index.keys() >= set(piece)]
+        id_: [[index[point] for point in line] for line in several if index.keys() >= set(line)]
         for id_, several in pieces.items()}

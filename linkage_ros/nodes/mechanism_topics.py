@@ -176,12 +176,13 @@ class MechanismTopics:
         return f'{failure}; the reach is {scene.in_words(inputs[0].reach)} {input_.unit}'
 
     def _unplaced(self, leg: int) -> str:
-        """Return the first joint line of a leg that has no place at the present inputs."""
+        """Return the first joint line of a leg that has no place, and further ones with limits."""
         mechanism, (lag, start, side, _) = self.model.mechanism, [
             *self.model.assembly.legs.values()][leg]
         inputs = [(start + side * (value - lag)) / mechanism.scale_of(name)
                   for name, value in zip(mechanism.inputs, self.inputs)]
         linkage = mechanism.linkage
         quantities = {**linkage.solve(inputs), **linkage.joint_angles(inputs)}
-        return next((line.text for line in linkage.design.lines
-                     if any(np.isnan(quantities.get(name, 0.0)).any() for name in line.names)), '')
+        lines = [line.text for line in linkage.design.lines if any(
+            np.isnan(quantities.get(name, 0.0)).any() for name in line.names)]
+        return '", "'.join([*lines[:1], *(line for line in lines[1:] if ' within ' in line)])

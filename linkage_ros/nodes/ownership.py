@@ -84,26 +84,26 @@ class Follower:
             self._waiting = {}
 
     def _compare(self, event: ParameterEvent, mechanisms: Iterable[str],
-                 there: Mapping[str, Any]) -> None:
+                 announced: Mapping[str, Any]) -> None:
         """Compare a full announcement with this node's mechanisms: equal ones are followed."""
         fields, present = self._parameters.followed, self._parameters.scene.mechanisms
-        here = {parameter.name: parameter.value
-                for name in {name.partition('.')[0] for name in there} & present.keys()
+        values = {parameter.name: parameter.value
+                for name in {name.partition('.')[0] for name in announced} & present.keys()
                 for parameter in present[name].parameters}
         self._owner, self._waiting = event.node, {}
-        unlike = {name.partition('.')[0]: name for name in there
-                  if fields[name].read_only and here[name] != there[name]}
+        unlike = {name.partition('.')[0]: name for name in announced
+                  if fields[name].read_only and values[name] != announced[name]}
         missing = present.keys() ^ set(mechanisms)
         self._mechanisms = present.keys() - missing - unlike.keys()
         self._warn('another mechanism, which is not followed', [
-            f'{name} is {short_repr(here[name])} here and {short_repr(there[name])} there'
+            f'{name} is {short_repr(values[name])} here and {short_repr(announced[name])} there'
             for name in unlike.values()])
         self._warn('other mechanisms; only one of the nodes has', sorted(missing))
         if event.new_parameters:
             self._warn('other values, which are followed', [
-                f'{name} was {short_repr(here[name])} and is now {short_repr(there[name])}'
-                for name in sorted(there) if name.partition('.')[0] in self._mechanisms
-                and here[name] != there[name]])
+                f'{name} was {short_repr(values[name])} and is now {short_repr(announced[name])}'
+                for name in sorted(announced) if name.partition('.')[0] in self._mechanisms
+                and values[name] != announced[name]])
 
     def _warn(self, what: str, particulars: Sequence[str]) -> None:
         """Warn that the owner has `what`, if it has any; throttled."""

@@ -108,10 +108,10 @@ class SceneParameters:
         descriptor.type = _kind(field).value
         if field.high is not None:
             # rclpy would refuse values that differ from an end by rounding.
-            whole = field.kind == 'integer'
+            is_integer = field.kind == 'integer'
             ends = {'from_value': field.low, 'to_value': field.high}
-            descriptor.integer_range = [IntegerRange(step=1, **ends)] if whole else []
-            descriptor.floating_point_range = [] if whole else [FloatingPointRange(**ends)]
+            descriptor.integer_range = [IntegerRange(step=1, **ends)] if is_integer else []
+            descriptor.floating_point_range = [] if is_integer else [FloatingPointRange(**ends)]
         return descriptor
 
     def _declare(self, owned: Sequence[scenes.Parameter]) -> None:

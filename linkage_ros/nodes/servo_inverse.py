@@ -127,8 +127,8 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
                          f'{n} in lever_angle, not {len(seeds)}')
     # Most requests have one angle, for which floats are faster than arrays.
     seed = [np.array(seeds) if len(seeds) > 1 else seeds[0]] if seeds else None
-    if seed and not np.all(np.abs(seed[0]) <= scene.FARTHEST):
-        raise ValueError(f'servo_near must be finite and within {scene.FARTHEST:g} '
+    if seed and not np.all(np.abs(seed[0]) <= scene.MAX_POSITION):
+        raise ValueError(f'servo_near must be finite and within {scene.MAX_POSITION:g} '
                          f'{inverse.units[0]} of zero')
     (positions,), (rates,) = inverse.positions([np.array(values) if n > 1 else values[0]], seed)
     response.servo_angle = array('d', np.ravel(positions).tobytes())
@@ -150,8 +150,8 @@ def solve_inputs_for(mechanism: scene.SceneMechanism, request: Any, response: An
     if len(values) != n or len(near) not in (0, n):
         raise ValueError(f'values must have {n} numbers and near as many or none, not '
                          f'{len(values)} and {len(near)}')
-    if not all(-scene.FARTHEST <= position <= scene.FARTHEST for position in near):
-        raise ValueError(f'near must be finite and within {scene.FARTHEST:g} of zero')
+    if not all(-scene.MAX_POSITION <= position <= scene.MAX_POSITION for position in near):
+        raise ValueError(f'near must be finite and within {scene.MAX_POSITION:g} of zero')
     answers = inverse.answers(values, inverse.inputs_of(near) if near else None)
     response.names = [settings.source for settings in mechanism.inputs.values()]
     response.positions = [position for inputs, _ in answers

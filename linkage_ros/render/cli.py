@@ -99,7 +99,7 @@ def draw(args):
 def started(mechanism, angle):
     """Return a mechanism whose crank starts at an angle [rad]; raise RequestError if it cannot."""
     first, input_ = mechanism.first, mechanism.first.input
-    if not input_.turns:
+    if not input_.is_angle:
         raise RequestError(f'--angle is for a crank: {mechanism.name} is driven by a length; it '
                            'is drawn at its start')
     if first.sweep and not input_.holds(first.sweep, angle, angle):

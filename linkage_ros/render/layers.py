@@ -252,7 +252,7 @@ class Headline:
 def readings(linkage, inputs, short=False):
     """Return texts of the inputs and, for a slotted lever, of its angle and the ratios."""
     if not hasattr(linkage, 'reduction'):
-        return [reading(re.sub(r'^crank(?=\d*$)', 'θ', input_.name), value) if input_.turns
+        return [reading(re.sub(r'^crank(?=\d*$)', 'θ', input_.name), value) if input_.is_angle
                 else f'{input_.name} = {value:.4g} m'
                 for input_, value in zip(linkage.inputs, inputs)]
     theta = math.remainder(inputs[0], math.tau)

@@ -75,7 +75,7 @@ class Picture:
             warnings.filterwarnings('error', 'constrained_layout not applied')
             for _ in range(2):  # the axes' size depends on their labels, these on their limits
                 try:
-                    self._canvas.draw()
+                    self.figure.get_layout_engine().execute(self.figure)
                 except UserWarning:
                     raise SceneError(CROWDED) from None
                 for panel in self.panels:

@@ -141,7 +141,7 @@ class _Loops:
                        for mechanism in self._mechanisms for drive in mechanism.inputs.values()}
         self._ends: dict[str, tuple[float, float]] = {}
         for drive in (drive for made in parts for drive in mechanisms[made.name].inputs.values()):
-            around = math.pi if drive.input.turns else 0.5 * component.size
+            around = math.pi if drive.input.is_angle else 0.5 * component.size
             low, high = drive.ends or (drive.start - around, drive.start + around)
             ends = sorted((end - drive.offset) / drive.ratio for end in (
                 max(low, drive.start - 2.0 * around), min(high, drive.start + 2.0 * around)))
@@ -212,13 +212,14 @@ class _Loops:
         fixed = component.is_of([*joints])
         isnan = np.any([np.isnan(values) for values in joints.values()], axis=0)
         pose = np.repeat(component.start, len(targets), axis=0)
-        gaps, poses = np.empty(isnan.shape), []
+        poses = []
         for k in range(steps):
             pose = component.moved_to(pose, {name: at[:, k] for name, at in joints.items()})
             pose[isnan[:, k]] = component.start
             pose = pose if fixed.all() else component.closed(pose, fixed)
-            gaps[:, k] = np.max(np.abs(component.errors(pose)[0] - self._misfit), axis=1)
             poses.append(pose)
+        errors = np.abs(component.errors(np.concatenate(poses))[0] - self._misfit)
+        gaps = np.column_stack(np.split(errors.max(axis=1), steps))
         gaps[isnan] = math.nan
         return Walk({**sources, **joints}, gaps, poses,
                     np.logical_and.accumulate(gaps <= self._allowed, axis=1))

@@ -118,8 +118,9 @@ def _checked(robot: Robot, balls: Sequence[Sequence[str]], imported: Sequence[ch
              reports: list[str]) -> tuple[dict[str, Any], list[str], dict[str, float]]:
     """Return what is described, without mechanisms that differ from the robot."""
     if not imported:
-        raise cli.RequestError(' '.join(reports) or 'no joint of this robot closes a loop; those '
-                               'of a URDF are in a file of their own: --loops FILE')
+        raise cli.RequestError(*reports or [
+            'no joint of this robot closes a loop; those of a URDF are in a file of their own: '
+            '--loops FILE'])
     parameters = {'mechanisms': [made.name for made in imported], **{
         key: value for made in imported for key, value in made.parameters.items()}}
     mechanisms = scene.read(parameters).mechanisms

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -54,7 +55,9 @@ def _compiled(path: str) -> Any:
     """Return a model without meshes, whose files may be missing."""
     # Warnings, which MuJoCo writes to a file, concern dynamics.
     mujoco.set_mju_user_warning(lambda text: None)
-    spec = MjSpec.from_file(path)
+    # A file with another ending MuJoCo reads as a text alone, without what it includes.
+    spec = MjSpec.from_file(path) if path.endswith('.xml') else MjSpec.from_string(
+        Path(path).read_text(encoding='utf-8'))
     for geom in spec.geoms:
         if geom.meshname or geom.hfieldname:
             geom.type, geom.meshname, geom.hfieldname = mujoco.mjtGeom.mjGEOM_SPHERE, '', ''

@@ -351,7 +351,7 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported],
     for drive in [drive for drive in drawing.drives if drive.source in limits]:
         ends, settings = limits[drive.source], mechanism.inputs[drive.name]
         low, high = _sweep(drive, ends, settings)
-        if -scene.FARTHEST < low < high - 1e-6 * settings.input.size < scene.FARTHEST:
+        if -scene.MAX_POSITION < low < high - 1e-6 * settings.input.size < scene.MAX_POSITION:
             parameters[f'{name}.{drive.name}.sweep'] = [low, high]
         else:
             reports.append(f'Left out: the limits of {drive.source}, from {ends[0]:.4g} to '
@@ -370,7 +370,7 @@ def _sweep(drive: check.Source, limits: tuple[float, float], settings: scene.Inp
     low, high = (float(short(drive.ratio * end + drive.offset, 1e-15))
                  for end in limits[::1 if drive.ratio > 0.0 else -1])
     for start, end in () if settings.input.is_whole(settings.reach) else settings.reach:
-        turns = math.tau * math.floor((drive.value - start) / math.tau) * settings.input.turns
+        turns = math.tau * math.floor((drive.value - start) / math.tau) * settings.input.is_angle
         if start + turns <= drive.value <= end + turns:
             # An end that is a dead point is not quite reached.
             edge = ROUNDING * (end - start)
@@ -399,7 +399,7 @@ def _drawn(robot: Robot, group: Group) -> Drawing:
     for i, line in enumerate(best.lines if best.drives else ()):
         # With a change point, the side in this pose may be the wrong one.
         name, *_, side = line.split()
-        if side in _OTHER:
+        if side in _OTHER and not best.error(best.lines, name) <= best.near:
             other = [*best.lines]
             other[i] = line[:-len(side)] + _OTHER[side]
             best.lines = min(best.lines, other, key=lambda lines: best.error(lines, name))

@@ -206,7 +206,7 @@ def _sweeps(mechanism: scene.SceneMechanism, limits: Mapping[str, tuple[float, f
     low, high = np.sort([np.multiply(limits.get(drive.source, (-math.inf, math.inf)), drive.ratio)
                          + drive.offset for drive in drives]).T
     start = np.clip([drive.start for drive in drives], low, high)
-    size = np.array([2.5 if drive.input.turns else 0.5 * drive.start for drive in drives])
+    size = np.array([2.5 if drive.input.is_angle else 0.5 * drive.start for drive in drives])
     for share in _SMALLER ** np.arange(_TRIES):
         ends = np.clip([start - share * size, start + share * size], low, high)
         values = np.meshgrid(*np.linspace(ends[0], ends[1], _SIDE).T)

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..cli import RequestError
 from ..robot_model.robot import at, FIXED, MAX_NUMBER, pose, Robot, turned_by
+from ..words import join_names
 
 
 def once(parts: Iterable[tuple[str, Element]]) -> dict[str, Element]:
@@ -55,14 +56,16 @@ def obey(robot: Robot, plugins: Iterable[Element]) -> None:
 
 
 def read(root: Element) -> Robot:
-    """Return the robot of the first model with joints."""
+    """Return the robot of the model with joints."""
     # Up to version 1.4 axes are in the model's frame.
     is_old = tuple(map(int, root.get('version', '1.12').split('.'))) <= (1, 4)
-    for model in (*root.findall('model'), *root.findall('world/model')):
-        parts = [*_parts(model, '')]
-        if any(part.tag == 'joint' for _, part in parts):
-            return _Model(once(parts), is_old, {'world': np.eye(4)}).robot()
-    raise RequestError('the SDF has no model with joints')
+    models = [(model.get('name', ''), parts)
+              for model in (*root.findall('model'), *root.findall('world/model'))
+              for parts in [[*_parts(model, '')]] if any(part.tag == 'joint' for _, part in parts)]
+    if len(models) != 1:
+        raise RequestError('one model of an SDF must have joints, not '
+                           + join_names(name for name, _ in models))
+    return _Model(once(models[0][1]), is_old, {'world': np.eye(4)}).robot()
 
 
 def join(robot: Robot, joints: Iterable[Element]) -> None:

@@ -221,21 +221,23 @@ class Component:
         the loops' stiffness.
         """
         free, poses = ~fixed, poses.copy()
+        moving = np.arange(len(poses))
         for i in range(count):
-            error, slope = self.errors(poses, True)
+            error, slope = self.errors(poses[moving], True)
             slope = slope[:, :, free]
             down = slope.swapaxes(1, 2)
             square, force = down @ slope, (down @ error[:, :, None])[..., 0]
             weight = soft * np.einsum('pii->p', square)[:, None]
             if spring:
                 weight *= 1.0 + max(spring * 0.5 ** i, 1e-13) / soft
-                force += weight * (poses / self.unit)[:, free]
+                force += weight * (poses[moving] / self.unit)[:, free]
             square += (weight[:, :, None] + 1e-300) * np.eye(free.sum())
             step = np.linalg.solve(square, force[..., None])[..., 0]
             far = np.max(np.abs(step), axis=1, initial=0.0)[:, None]
             step *= np.minimum(1.0, MAX_STEP / np.maximum(far, MAX_STEP))
-            poses[:, free] -= step * self.unit[free]
-            if np.all(far < LAST_STEP):
+            poses[np.ix_(moving, free)] -= step * self.unit[free]
+            moving = moving[far[:, 0] >= LAST_STEP]
+            if not len(moving):
                 break
         return poses
 

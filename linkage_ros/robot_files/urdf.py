@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from graphlib import TopologicalSorter
 import re
-from typing import Any, Mapping, Sequence
+from typing import Any, Sequence
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -119,17 +119,21 @@ def _close_by_frames(robot: Robot) -> None:
             _pair(robot, match['name'], HINGE if len(axes) == 2 else BALL, ends, *axes)
 
 
-def close(robot: Robot, loops: Mapping[str, Any]) -> None:
-    """Add the loops of another file; raise RequestError for a key that is not known."""
-    for key in loops:
+def close(robot: Robot, loops: Any) -> None:
+    """Add the loops of another file; raise RequestError for a key or a motor that is not known."""
+    for key in loops if isinstance(loops, dict) else [loops]:
         if key not in _KEYS:
             raise RequestError(f'there is no key {short_repr(key)}{suggestion(key, _KEYS, 200)}')
+        if key != 'ball_limit_deg' and not isinstance(loops[key], list):
+            raise RequestError(f'{key} must be a list, not {short_repr(loops[key])}')
     for i, cut in enumerate(loops.get('closures', ())):
         point = at(numbers(cut['point']))
         robot.join(f'closures[{i}]', HINGE, (cut['link_a'], cut['link_b']), point,
                    numbers(cut['axis']), point)
     types = loops.get('type', ())
     for i, ends in enumerate(loops.get('closed_loop', ())):
+        if not isinstance(ends, list) or len(ends) != 2:
+            raise RequestError(f'closed_loop must have pairs of names, not {short_repr(ends)}')
         _pair(robot, '='.join(ends), str(types[i] if i < len(types) else FIXED), ends)
     for key, kind in (('pin_loops', HINGE), ('ball_loops', BALL)):
         for i, cut in enumerate(loops.get(key, ())):
@@ -140,7 +144,9 @@ def close(robot: Robot, loops: Mapping[str, Any]) -> None:
                        *((name, BALL) for name in loops.get('ball_upgrades', ()))):
         _change(robot, name, str(kind).lower())
     # Its motors are those of the closed robot, transmissions those of the open tree.
-    robot.driven = [name for key in _MOTORS for name in loops.get(key, ())] or robot.driven
+    motors = [name for key in _MOTORS for name in loops.get(key, ())]
+    robot.check_names(motors)
+    robot.driven = motors or robot.driven
 
 
 def _change(robot: Robot, name: str, kind: str) -> None:

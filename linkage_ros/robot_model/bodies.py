@@ -44,12 +44,12 @@ COLOURS = {name: (*palette.rgb(code), 1.0) for name, code in (
 # Of each kind of piece: shape, radius (of a box its thickness) as a fraction of the longest bar,
 # and colour; none: that of the link that moves it.
 STYLES = {'bar': (CYLINDER, 1 / 80, ''), shapes.ROD: (CYLINDER, 1 / 80, 'bar'),
-         shapes.BARREL: (CYLINDER, 1 / 32, ''), shapes.GUIDE: (BOX, 1 / 80, 'slot'),
-         shapes.BLOCK: (BOX, 1 / 20, ''), 'joint': (BALL, 1 / 40, 'joint')}
+          shapes.BARREL: (CYLINDER, 1 / 32, ''), shapes.GUIDE: (BOX, 1 / 80, 'slot'),
+          shapes.BLOCK: (BOX, 1 / 20, ''), 'joint': (BALL, 1 / 40, 'joint')}
 # Thickness of bars as a fraction of the longest.
 WIDTH = 1 / 40
 # Range of sizes [m] that displays can draw in single precision.
-SMALLEST, LARGEST = 1e-30, 1e30
+MIN_LENGTH, MAX_LENGTH = 1e-30, 1e30
 # Density of aluminium [kg/m^3].
 DENSITY = 2700.0
 # Margin at each end of a travel: [rad], for a slide as a fraction of the longest bar.
@@ -119,11 +119,11 @@ def merged(robots: Sequence[Robot]) -> Robot:
 def size(mechanism: SceneMechanism) -> float:
     """Return the length of the longest bar [m]; raise SceneError if it or a place is too far."""
     name, length = mechanism.name, mechanism.scale * float(mechanism.linkage.longest)
-    if not SMALLEST <= length <= LARGEST:
+    if not MIN_LENGTH <= length <= MAX_LENGTH:
         raise SceneError(f'{name}.scale and {name}.dimensions must make the longest bar from '
-                         f'{SMALLEST:g} to {LARGEST:g} m long, not {length:g}')
-    if max(map(abs, mechanism.pose)) > LARGEST:
-        raise SceneError(f'{name}.pose must be within {LARGEST:g} m, not {mechanism.pose}')
+                         f'{MIN_LENGTH:g} to {MAX_LENGTH:g} m long, not {length:g}')
+    if max(map(abs, mechanism.pose)) > MAX_LENGTH:
+        raise SceneError(f'{name}.pose must be within {MAX_LENGTH:g} m, not {mechanism.pose}')
     return length
 
 
@@ -234,7 +234,7 @@ def travels(mechanism: SceneMechanism) -> dict[str, Arc]:
         if has_one_leg and settings.sweep and not settings.input.is_whole(settings.reach):
             low, high = np.min(settings.reach), np.max(settings.reach)
             # A crank's angle is in the turn of its sweep.
-            turns = math.tau * ((settings.sweep[1] - low) // math.tau) * settings.input.turns
+            turns = math.tau * ((settings.sweep[1] - low) // math.tau) * settings.input.is_angle
             ends[name] = float(low + turns), float(high + turns)
     others = [name for name in linkage.joints if name not in mechanism.inputs]
     if len(mechanism.inputs) == 1 and others:

@@ -103,7 +103,7 @@ def drawn(mechanism: SceneMechanism, names: Collection[str]) -> list[Shape]:
 def cranks(linkage: Mechanism) -> list[tuple[str, str]]:
     """Return the bars that inputs turn, from centre to pin."""
     in_space = len(linkage.axes) > 2
-    names = [input_.name for input_ in linkage.inputs if input_.turns or in_space]
+    names = [input_.name for input_ in linkage.inputs if input_.is_angle or in_space]
     links = [link for link in linkage.links if link.name in names]
     if in_space:
         # A link has no tip there: rods end on it.

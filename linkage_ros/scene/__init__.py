@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import re
 from typing import Any, Iterable, Mapping
 
-from .input_settings import FARTHEST, in_words, InputSettings
+from .input_settings import in_words, InputSettings, MAX_POSITION
 from .joint_names import check_distinct
 from .parameter_file import overrides, sections
 from .parameters import DRIVER, Field, INVERSE, KINEMATICS, Parameter, plain, SceneError, Values
@@ -23,7 +23,7 @@ from .scene_mechanism import FRAME, is_distinct, read_mechanism, SceneMechanism
 from .. import mechanisms
 from ..words import plain_text, short_repr
 
-__all__ = ['changed', 'InputSettings', 'DRIVER', 'FARTHEST', 'Field', 'in_words', 'INVERSE',
+__all__ = ['changed', 'InputSettings', 'DRIVER', 'MAX_POSITION', 'Field', 'in_words', 'INVERSE',
            'KINEMATICS', 'load', 'SceneMechanism', 'Parameter', 'plain', 'read', 'Scene',
            'SceneError']
 
@@ -65,11 +65,11 @@ class Scene:
     @property
     def sources(self) -> dict[str, list[tuple[str, int]]]:
         """The inputs of each source joint: their mechanism's name and their index in it."""
-        found: dict[str, list[tuple[str, int]]] = {}
+        sources: dict[str, list[tuple[str, int]]] = {}
         for name, mechanism in self.mechanisms.items():
             for i, settings in enumerate(mechanism.inputs.values()):
-                found.setdefault(settings.source, []).append((name, i))
-        return found
+                sources.setdefault(settings.source, []).append((name, i))
+        return sources
 
     def changed_from(self, old: 'Scene') -> list[Parameter]:
         """Return the parameters whose values differ from an older scene of the same mechanisms."""

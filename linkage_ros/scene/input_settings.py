@@ -18,15 +18,15 @@ SWEEP_MARGIN = 0.01
 # Letters of the intervals in a message, at most: gears may have hundreds.
 MAX_ARCS = 200
 # Largest angle [rad] whose rounding error is negligible for a crank.
-FARTHEST = 1e6
+MAX_POSITION = 1e6
 MAX_SPEED = 100.0
 # Farthest start of an angle [rad], if its period is no longer.
-FARTHEST_START = 4.0 * math.pi
+MAX_START = 4.0 * math.pi
 
 
 def is_sweep(ends: tuple[float, ...]) -> bool:
     """Return whether there is a lower and a higher end, or none."""
-    return not ends or len(ends) == 2 and -FARTHEST <= ends[0] < ends[1] <= FARTHEST
+    return not ends or len(ends) == 2 and -MAX_POSITION <= ends[0] < ends[1] <= MAX_POSITION
 
 
 def is_ratio(ratio: float) -> bool:
@@ -40,7 +40,7 @@ START = Field('double', 'Initial value of the {0} [{unit}]; a new value moves it
               default=0.0, readers=(DRIVER,), unit='{1}', group='starts')
 SWEEP = Field('double_array', "Ends of the {0}'s oscillation [{unit}]; empty: its reach, or full "
               'rotation.', default=(), unit='{1}',
-              rule=f'the lower end and the higher end, within {FARTHEST:g} of zero, or none',
+              rule=f'the lower end and the higher end, within {MAX_POSITION:g} of zero, or none',
               holds=is_sweep)
 SOURCE = Field('string', 'Source joint, whose position in messages gives the {0}; empty: '
                '<mechanism>_ and the name of the {0} or of the measured output.', default='',
@@ -120,7 +120,7 @@ def read_settings(name: str, linkage: Mechanism, input_: Input, reach: tuple[Arc
                   scale: float, values: Values) -> InputSettings:
     """Read the settings of an input; its lengths are those of the linkage times `scale`."""
     key, default_speed = input_.name, 1.0
-    if not input_.turns:
+    if not input_.is_angle:
         input_ = input_._replace(low=scale * input_.low, high=scale * input_.high)
         reach = tuple((scale * low, scale * high) for low, high in reach)
         stroke = max(high - low for low, high in reach)
@@ -130,7 +130,7 @@ def read_settings(name: str, linkage: Mechanism, input_: Input, reach: tuple[Arc
         return values.take(f'{key}.{setting}', field.about(key, input_.unit, **about), default)
 
     is_whole = input_.is_whole(reach)
-    farthest = max(FARTHEST_START, input_.high) if input_.turns else None
+    farthest = max(MAX_START, input_.high) if input_.is_angle else None
     speed = take('speed', SPEED, default_speed)
     start = take('start', START, low=farthest and -farthest, high=farthest)
     sweep = ends = take('sweep', SWEEP) or None

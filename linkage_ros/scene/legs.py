@@ -122,7 +122,7 @@ class LegGroup:
     def within_reach(self, value: float) -> list[bool]:
         """Return which legs can be assembled at a value [rad or m] of the input, by its reach."""
         first = self.linkage.inputs[0]
-        value = value if first.turns else value / self._scale
+        value = value if first.is_angle else value / self._scale
         return [first.on(self.reach, leg.start + leg.side * (value - leg.lag))
                 for leg in self.legs.values()]
 

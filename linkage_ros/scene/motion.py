@@ -95,7 +95,7 @@ class Motion:
     @classmethod
     def of(cls, settings: InputSettings, since: int = 0) -> Motion:
         """Return the motion of an input, which is at its `start` at the time `since` [ns]."""
-        return cls(settings.speed, settings.sweep, settings.start, since, settings.input.turns,
+        return cls(settings.speed, settings.sweep, settings.start, since, settings.input.is_angle,
                    settings.input.period)
 
     def changed(self, speed: float, sweep: Arc | None, period: float, now: int) -> Motion:

@@ -172,8 +172,8 @@ class SceneMechanism:
         scale, unit, first = self.scales[0], self.scale_of(output), self.first.input
         turn = first.turn if first.wraps else math.inf
         arcs = [(low / scale, min(high, low + turn) / scale) for low, high in self.first.arcs]
-        return [((least * unit, low * scale), (greatest * unit, high * scale))
-                for (least, low), (greatest, high) in self.linkage.extremes(output, arcs)]
+        return [((minimum * unit, low * scale), (maximum * unit, high * scale))
+                for (minimum, low), (maximum, high) in self.linkage.extremes(output, arcs)]
 
     @cached_property
     def ends(self) -> list[Arc | None]:
@@ -291,7 +291,7 @@ def _built(design: Design, dimensions: tuple, branches: tuple) -> Mechanism:
 
 def _legs(name: str, linkage: Mechanism, values: Values) -> tuple[int, bool]:
     first, *others = linkage.inputs
-    able = first.turns and not others and len(linkage.axes) == 2
+    able = first.is_angle and not others and len(linkage.axes) == 2
     if able:
         crank = next(link for link in linkage.links if link.name == first.name)
         able = not crank.zero and linkage.solve(0.0, (crank.joint,))[crank.joint][0] == 0.0

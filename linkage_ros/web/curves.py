@@ -92,7 +92,7 @@ def curve(mechanism: SceneMechanism, present: Sequence[float], kind: str = POSIT
     """
     Return one of KINDS over the first input: x and y in `units`, y None where it has none.
 
-    `dead` are the dead points, `ends` those of the reach; y grows with the `power` of the
+    `ends` are those of the reach, `dead` the other dead points; y grows with the `power` of the
     input's speed.
     """
     sweep = Sweep(mechanism, present, dense_ends=True)
@@ -111,7 +111,7 @@ def curve(mechanism: SceneMechanism, present: Sequence[float], kind: str = POSIT
     return {'input': sweep.input.name, 'output': output, 'names': names,
             'units': [sweep.input.unit, unit], 'power': POWERS.get(kind, 0), 'x': x.tolist(),
             'y': list(map(shown, y.tolist())),
-            'ends': sweep.ends.tolist(), 'dead': sweep.dead.tolist()}
+            'ends': sweep.ends.tolist(), 'dead': np.setdiff1d(sweep.dead, sweep.ends).tolist()}
 
 
 def table(mechanism: SceneMechanism, present: Sequence[float]) -> str:

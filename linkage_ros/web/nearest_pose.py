@@ -35,26 +35,26 @@ def nearest_inputs(linkage: Mechanism, joint: str, place: Sequence[float],
     else:
         value, low, high = _nearest_sample(linkage, joint, goal, present[0], arcs[0])
 
-    def gap_at(inputs: np.ndarray) -> Any:
+    def error_at(inputs: np.ndarray) -> Any:
         return goal - linkage.solve(theta_of(inputs), (joint,))[joint]
 
-    gap = gap_at(value)
+    error = error_at(value)
     for _ in range(GAUSS_NEWTON_STEPS):
         rates = np.stack([linkage.velocity(theta_of(value), (joint,), by)[joint]
                           for by in range(len(value))], axis=1) * sizes
         if not np.isfinite(rates).all():
             break
-        # An input at its end stays there if the gap pulls it beyond.
-        descent = gap @ rates
+        # An input at its end stays there if the error pulls it beyond.
+        descent = error @ rates
         free = ~((value <= low) & (descent < 0.0) | (value >= high) & (descent > 0.0))
-        step = sizes * np.linalg.lstsq(rates * free, gap, rcond=None)[0]
+        step = sizes * np.linalg.lstsq(rates * free, error, rcond=None)[0]
         for part in 0.5 ** np.arange(STEP_HALVINGS):
             tried = np.clip(value + part * step, low, high)
-            if np.hypot(*gap_at(tried)) < np.hypot(*gap):
+            if np.hypot(*error_at(tried)) < np.hypot(*error):
                 break
         else:
             break
-        value, gap = tried, gap_at(tried)
+        value, error = tried, error_at(tried)
     return value
 
 
@@ -66,7 +66,7 @@ def _nearest_sample(linkage: Mechanism, joint: str, goal: np.ndarray, present: f
     if not np.isfinite(path).any():
         raise ValueError('the linkage cannot be assembled here')
     width = np.nanmax(np.nanmax(path, axis=(0, 1)) - np.nanmin(path, axis=(0, 1)))
-    away = np.hypot(*np.moveaxis(path - goal, -1, 0)) + LEASH * width * linkage.inputs[0].apart(
-        samples, present) / np.ptp(samples)
-    row, column = divmod(int(np.nanargmin(away)), DRAG_SAMPLES)
+    moved = linkage.inputs[0].distance(samples, present) / np.ptp(samples)
+    distances = np.hypot(*np.moveaxis(path - goal, -1, 0)) + LEASH * width * moved
+    row, column = divmod(int(np.nanargmin(distances)), DRAG_SAMPLES)
     return [np.array([value]) for value in (samples[row, column], *arcs[row])]

@@ -114,7 +114,7 @@ def arrows(mechanism: SceneMechanism, present: Sequence[float], kind: str,
         efforts = mechanism.efforts(present) if mechanism.loads else ()
         return {'unit': 'N', 'at': {
             name: load for name, load in mechanism.loads.items() if not isinstance(load, float)},
-            'efforts': {name: [shown(effort), 'N·m' if settings.input.turns else 'N']
+            'efforts': {name: [shown(effort), 'N·m' if settings.input.is_angle else 'N']
                         for (name, settings), effort in zip(mechanism.inputs.items(), efforts)}}
     linkage, theta = mechanism.linkage, mechanism.theta(present)
     rates = mechanism.theta([speeds[name] for name in mechanism.inputs])
@@ -176,7 +176,7 @@ def inside(settings: InputSettings, value: float) -> float:
     nearest = [input_.wrapped(value)] if input_.is_whole(arcs) else [
         min(max(input_.nearest_equivalent(value, 0.5 * (low + high)), low), high)
         for low, high in arcs]
-    return float(min(nearest, key=lambda end: input_.apart(end, value)))
+    return float(min(nearest, key=lambda end: input_.distance(end, value)))
 
 
 def _input_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
@@ -187,7 +187,7 @@ def _input_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
     places = mechanism.linkage.solve(mechanism.theta(inputs))
     if not all(math.isfinite(part) for place in places.values() for part in place):
         raise SceneError(f'{mechanism.name} cannot be assembled there')
-    is_outside = input_.apart(new, input_.wrapped(value)) > CLOSE * input_.size
+    is_outside = input_.distance(new, input_.wrapped(value)) > CLOSE * input_.size
     return inputs, {'name': name, 'arcs': arcs, 'unit': input_.unit} if is_outside else None
 
 
@@ -196,12 +196,12 @@ def _output_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
     solution, _ = mechanism.follow((name,), (value,), present)
     if math.isfinite(solution[0]):
         return solution, None
-    spans, is_angle = mechanism.extremes(name), mechanism.linkage.is_angle(name)
+    arcs, is_angle = mechanism.extremes(name), mechanism.linkage.is_angle(name)
     turn = math.tau if is_angle else math.inf
     _, nearest = min((abs(math.remainder(extreme - value, turn)), at)
-                     for span in spans for extreme, at in span)
+                     for arc in arcs for extreme, at in arc)
     return [nearest], {'name': name, 'unit': 'rad' if is_angle else 'm',
-                       'arcs': [(low, high) for (low, _), (high, _) in spans]}
+                       'arcs': [(low, high) for (low, _), (high, _) in arcs]}
 
 
 def _joint_at(mechanism: SceneMechanism, present: Sequence[float], joint: str, place: Any,

@@ -200,11 +200,11 @@ class SceneView:
 
     def _saved(self, owner: str) -> str:
         """Return a parameter file of a node's scene: its definition and changed values."""
-        whole = self._scenes[owner]
-        names = {parameter.name for parameter in whole.parameters}
+        old = self._scenes[owner]
+        names = {parameter.name for parameter in old.parameters}
         # An input that was stopped is saved with the speed that it had.
         speeds = {name: speed for name, speed in self._speeds[owner].items() if name in names}
-        return writing.in_yaml(writing.without_defaults(scene.changed(whole, speeds)))
+        return writing.in_yaml(writing.without_defaults(scene.changed(old, speeds)))
 
     async def read(self, text: str) -> JsonObject:
         """Return the result of `poses.number`."""
@@ -322,12 +322,12 @@ class SceneView:
         for node in self._graph.keys() - graph.keys():
             self._announced.pop(node, None)
         self._graph, self._is_stale = graph, False
-        wanted: dict[str, Callable[[str], Any]] = {
+        entities: dict[str, Callable[[str], Any]] = {
             **dict.fromkeys((topic for topic, _ in graph.values()), self._listen),
             **dict.fromkeys((f'{node}/{SETTER}' for node in graph),
                             partial(self._node.create_client, SetParametersAtomically))}
         present = dict.fromkeys(self._entities, self._listen)
-        self._keep({**present, **wanted})
+        self._keep({**present, **entities})
         await self._until(lambda: self._announced.keys() >= graph.keys(), MAX_ANNOUNCE_S)
         self._scenes, self._mechanisms = {}, {}
         for owner, (_, sources) in sorted(graph.items()):
@@ -338,10 +338,10 @@ class SceneView:
                 for name in self._scenes[owner].mechanisms:
                     key = f'{_space(owner)}/{name}'
                     self._mechanisms[key] = ShownMechanism(key, name, owner, sources, nodes)
-                    wanted.update(dict.fromkeys(sources, self._follow))
-                    wanted[f'{key}/markers'] = partial(self._draw, key, MarkerArray, NEWEST)
-                    wanted[f'{key}/locus'] = partial(self._draw, key, Marker, LATCHED)
-        self._keep(wanted)
+                    entities.update(dict.fromkeys(sources, self._follow))
+                    entities[f'{key}/markers'] = partial(self._draw, key, MarkerArray, NEWEST)
+                    entities[f'{key}/locus'] = partial(self._draw, key, Marker, LATCHED)
+        self._keep(entities)
         for client in self.clients:
             self._show(client)
 
@@ -358,24 +358,24 @@ class SceneView:
         nodes = {parameter.name: node for node in (*self._announced, owner)
                  if node in self._graph and _space(node) == _space(owner)
                  for parameter in before.parameters if parameter.name in self._announced[node]}
-        whole = self._scenes[owner] = scene.changed(
+        merged = self._scenes[owner] = scene.changed(
             before, {name: self._announced[node][name] for name, node in nodes.items()})
         self._speeds[owner].update(
-            (parameter.name, parameter.value) for parameter in whole.parameters
+            (parameter.name, parameter.value) for parameter in merged.parameters
             if parameter.field.group == 'speeds' and parameter.value)
         return nodes
 
-    def _keep(self, wanted: Mapping[str, Callable[[str], Any]]) -> None:
+    def _keep(self, entities: Mapping[str, Callable[[str], Any]]) -> None:
         """Have these subscriptions and clients, each by a function of its name, and no others."""
-        for name in self._entities.keys() - wanted.keys():
+        for name in self._entities.keys() - entities.keys():
             entity = self._entities.pop(name)
             self._feeds.pop(name, None)
             if isinstance(entity, Client):
                 self._node.destroy_client(entity)
             else:
                 self._node.destroy_subscription(entity)
-        for name in wanted.keys() - self._entities.keys():
-            self._entities[name] = wanted[name](name)
+        for name in entities.keys() - self._entities.keys():
+            self._entities[name] = entities[name](name)
 
     def _listen(self, topic: str) -> Any:
         return self._node.create_subscription(
@@ -414,12 +414,12 @@ class SceneView:
             self._news.set()
             return
         for owner in [*self._scenes] if event.node in self._graph else ():
-            whole = self._scenes[owner]
+            old = self._scenes[owner]
             with suppress(SceneError):
                 self._read(owner)
             for shown in self._mechanisms.values():
                 if shown.owner == owner and (self._scenes[owner].mechanisms[shown.name]
-                                             is not whole.mechanisms[shown.name]):
+                                             is not old.mechanisms[shown.name]):
                     for client in self.clients:
                         client.tell(shown.key, {'op': 'mechanism', **self._described(shown)})
 

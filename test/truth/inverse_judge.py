@@ -51,7 +51,7 @@ class Output:
             math.tau if not own else self.first.turn if self.first.wraps else math.inf)
         low, high = self.first.low, self.first.high
         # Few of many turns: the judge is slow.
-        turns = min(round((high - low) / math.tau), 3) if self.first.turns else 1
+        turns = min(round((high - low) / math.tau), 3) if self.first.is_angle else 1
         if turns > 1:
             low, high = -math.pi * turns, math.pi * turns
         self.theta = np.linspace(low, high, SAMPLES * max(turns, 1))
@@ -92,7 +92,7 @@ class Output:
                 middle = 0.5 * (inside + out)
                 inside, out = (middle, out) if np.isfinite(self.at(middle)) else (inside, middle)
             yield inside, -1.0 if known[i] else 1.0
-        if not self.first.turns:  # a whole turn, or a few of many, have no ends
+        if not self.first.is_angle:  # a whole turn, or a few of many, have no ends
             yield from ((end, side) for end, side, there in (
                 (self.theta[0], 1.0, known[0]), (self.theta[-1], -1.0, known[-1])) if there)
 
@@ -178,12 +178,12 @@ def judge(linkage, name, rng, count=6, others=()):
         if kind == 'ordinary':
             # Of a part of a period, a quarter on both sides of the seed is promised.
             expected += [root for root in output.roots(value) if (
-                first.wraps or not first.turns
+                first.wraps or not first.is_angle
                 or abs(root - at) <= 0.25 * (first.high - first.low))
                 and output.ulp_changes(root) <= SINGULAR * output.size]
         close = (AT if kind == 'ordinary' else NEXT) * first.size
         for root in expected:
-            gaps = [first.apart(root, x) for x in answers]
+            gaps = [first.distance(root, x) for x in answers]
             if not min(gaps, default=9.0) <= close and not any(
                     # Where the output hardly changes, its value does not tell the input.
                     gap < 1e-2 and output.away(output.at(np.linspace(root, x, 9)), value).max()
@@ -199,7 +199,7 @@ def judge(linkage, name, rng, count=6, others=()):
             elif kind == 'ordinary':
                 worst = max(worst, error)
             # Two that are near are one if the output has its value between them, too.
-            if any(first.apart(x, y) <= 1e-9 * first.size and output.away(
+            if any(first.distance(x, y) <= 1e-9 * first.size and output.away(
                     output.at(x + 0.5 * math.remainder(y - x, first.turn)), value)
                     <= MOST * 2.0 ** -53 * output.size for y in answers[:k]):
                 _note(found, kind, 'duplicates', linkage, name, at, others)
@@ -241,7 +241,7 @@ def judge_several(linkage, names, rng, count=6):
         answers = inverse.all(row.tolist())
         found['ordinary', 'questions'] += 1
         margin = Solution(pose, inverse).margin
-        if not any(max(input_.apart(x, y) / size for input_, x, y, size in zip(
+        if not any(max(input_.distance(x, y) / size for input_, x, y, size in zip(
                 inverse.inputs, answer.inputs, pose, sizes)) < 1e-9 / margin
                 for answer in answers):
             _note(found, 'ordinary', 'lost', linkage, names, tuple(pose), ())

@@ -50,8 +50,8 @@ class Subject:
         self.mechanism = design.linkage()
         self.linkage = Linkage(design.joints, design.dimensions, design.branches)
         self.inputs = self.mechanism.inputs
-        self.turns = self.inputs[0].turns
-        self.held = tuple(float(rng.uniform(-3.0, 3.0) if input_.turns
+        self.turns = self.inputs[0].is_angle
+        self.held = tuple(float(rng.uniform(-3.0, 3.0) if input_.is_angle
                                 else rng.uniform(input_.low, input_.high))
                           for input_ in self.inputs[1:])
         self.poses = drawing_accuracy.outputs(self.linkage, self.mechanism.links)
@@ -89,7 +89,7 @@ class Subject:
 
     def _misfit(self, way):
         """Return at how many values the mechanism does not go this way past its change points."""
-        given = np.column_stack([self.rng.uniform(-math.tau, math.tau, 60) if input_.turns else
+        given = np.column_stack([self.rng.uniform(-math.tau, math.tau, 60) if input_.is_angle else
                                  self.rng.uniform(input_.low, input_.high, 60)
                                  for input_ in self.inputs])
         drawing, unit = self._drawn(list(given.T), way)
@@ -114,7 +114,7 @@ class Subject:
 
     def _drawn(self, given, way):
         rows, turns, unit = self.linkage.in_floats(way)
-        given = [value if input_.turns else value / unit
+        given = [value if input_.is_angle else value / unit
                  for value, input_ in zip(given, self.inputs)]
         with np.errstate(all='ignore'):
             return draw(FLOATS, self.linkage, rows, given, way, turns), unit
@@ -217,7 +217,7 @@ def accelerations(subject):
     given = asked(subject, 1)
     if subject.shortest_arm(given) < SHORT:
         return
-    sizes = [1.0 if input_.turns else input_.high - input_.low for input_ in subject.inputs]
+    sizes = [1.0 if input_.is_angle else input_.high - input_.low for input_ in subject.inputs]
     motion = drawing_accuracy.Motion(*(tuple(row) for row in subject.rng.uniform(
         -2.0, 2.0, (2, len(sizes))) * sizes))
     yield from _broken(subject, given, False, motion=motion)

@@ -98,7 +98,7 @@ def equal_bars(rng):
 def given(rng, count, spots, inputs):
     """Return values of inputs, (count, inputs); `spots` of the first are asked for more often."""
     spots = [spots, *([] for _ in inputs[1:])]
-    return np.array([[_angle(rng, [*RIGHT_ANGLES, *near]) if input_.turns
+    return np.array([[_angle(rng, [*RIGHT_ANGLES, *near]) if input_.is_angle
                       else _length(rng, input_, [input_.low, input_.high, *near])
                       for input_, near in zip(inputs, spots)] for _ in range(count)])
 

@@ -145,7 +145,7 @@ class Builder:
               called: str = '') -> None:
         """Turn a crank [m] about a joint; its zero is +x, or +y if `up`, or towards a joint."""
         link = called or self._numbered('crank')
-        turning = self.drive(Input(link, ANGLE), geared)
+        angle = self.drive(Input(link, ANGLE), geared)
         if zero is None:
             self._on_ground(centre, ' unless the line has zero and a joint of its link')
             parent, along = GROUND, Complex(0.0, 1.0) if up else Complex(1.0, 0.0)
@@ -155,12 +155,12 @@ class Builder:
                 start = arctangent(along.y, along.x)
         else:
             parent, along, start = self._direction(centre, zero)
-        crank = planar.Crank(self.points[centre].place, length, along, turning,
+        crank = planar.Crank(self.points[centre].place, length, along, angle,
                              backwards=len(self.mirrors) % 2 == 1)
         bar = crank.bar() if parent == GROUND else along * Complex(
-            cosine(turning), sine(turning)) * length
+            cosine(angle), sine(angle)) * length
         self._add_link(centre, name, bar, length, link, parent, start)
-        self.joint_values[link] = turning
+        self.joint_values[link] = angle
         self._place(name, centre, bar, link, length)
         if parent == GROUND:
             self.points[name].crank = crank
@@ -199,7 +199,7 @@ class Builder:
         block = self._numbered('block')
         self.yokes[block] = pin
         self._add_block(block, name, origin, towards,
-                   dot(along, end.place - start.place), end.magnitude + start.magnitude)
+                        dot(along, end.place - start.place), end.magnitude + start.magnitude)
 
     def _add_block(self, link: str, name: str, origin: str, towards: str, place: Real, way: Real
               ) -> None:
@@ -222,7 +222,7 @@ class Builder:
 
     def drive(self, input_: Input, geared: Gear | None) -> Real:
         """Return the expression of an input [rad or m]: a new one, or a geared one."""
-        if not input_.turns:
+        if not input_.is_angle:
             self.require(real(input_.high - input_.low), f'the lower end of the {input_.name} '
                          'must be less than its upper end')
         if geared is None:
@@ -231,8 +231,8 @@ class Builder:
             self.arguments.append(value)
         else:
             other, driving = self.driven.get(geared.input, (None, None))
-            if other is None or driving is None or other.turns != input_.turns:
-                alike = [name for name, (x, _) in self.driven.items() if x.turns == input_.turns]
+            if other is None or driving is None or other.is_angle != input_.is_angle:
+                alike = [name for name, (x, _) in self.driven.items() if x.kind == input_.kind]
                 raise ConstructionError(f'it cannot be geared to {geared.input}; allowed: '
                                         f'{", ".join(alike) or f"none in {input_.unit}"}')
             value = geared.ratio * driving + geared.offset
@@ -240,9 +240,9 @@ class Builder:
                 turns = geared.ratio * self._turned[geared.input]
                 # What is geared to this one counts from the turns that are left out here: an even
                 # number, after which a branch is the same whatever change points it passes.
-                whole = 2.0 * nearest_integer(0.5 * turns)
-                self._turned[input_.name] = whole
-                value = value + 2.0 * pi * (turns - whole)
+                even = 2.0 * nearest_integer(0.5 * turns)
+                self._turned[input_.name] = even
+                value = value + 2.0 * pi * (turns - even)
         self.driven[input_.name] = input_, value
         return value
 
@@ -283,14 +283,14 @@ class Builder:
     def dyad(self, name: str, first: str, second: str, to_first: Real, to_second: Real,
              side: float) -> None:
         """Join bars of to_first and to_second [m] from two joints, left of first -> second."""
-        found = planar.dyad(self.arm(first, second, smooth=True), to_first, to_second, side)
-        self.limits += found.limits
+        dyad = planar.dyad(self.arm(first, second, smooth=True), to_first, to_second, side)
+        self.limits += dyad.limits
         start, pivot = self.points[first], self.points[second]
-        place = start.place + found.first
+        place = start.place + dyad.first
         if start.link != GROUND == pivot.link:
             # About a joint of the ground it can only turn.
-            place = planar.with_velocity(place, pivot.place, found.second)
-        self._pair(name, first, second, found, to_first, to_second, place)
+            place = planar.with_velocity(place, pivot.place, dyad.second)
+        self._pair(name, first, second, dyad, to_first, to_second, place)
 
     def rigid(self, name: str, first: str, second: str, to_first: Real, to_second: Real,
               side: float) -> None:
@@ -487,14 +487,14 @@ class Builder:
                 return bars[1].vector - bars[0].vector
         return self.points[second].place - self.points[first].place
 
-    def _pair(self, name: str, first: str, second: str, found: planar.Dyad, to_first: Real,
+    def _pair(self, name: str, first: str, second: str, dyad: planar.Dyad, to_first: Real,
               to_second: Real, place: Complex | None = None) -> None:
         """Join the two bars of a dyad: the joint belongs to the first, the second is cut there."""
-        link = self._add_link(first, name, found.first, to_first)
-        self._place(name, first, found.first, link, to_first, place)
-        link = self._add_link(second, name, found.second, to_second)
-        self._bar(second, name, found.second, to_second, link)
-        self.transmissions[name] = planar.transmission(found)
+        link = self._add_link(first, name, dyad.first, to_first)
+        self._place(name, first, dyad.first, link, to_first, place)
+        link = self._add_link(second, name, dyad.second, to_second)
+        self._bar(second, name, dyad.second, to_second, link)
+        self.transmissions[name] = planar.transmission(dyad)
 
     def _add_link(self, joint: str, tip: str, bar: Complex, length: Real | None,
                   name: str | None = None, parent: str | None = None,

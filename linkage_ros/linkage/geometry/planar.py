@@ -52,7 +52,7 @@ from ...formula.expression import (
 # normal number, and it is far below the rounding of a direction.
 TINY = 2.0 ** -330
 # An arm whose square is smaller has no direction: squares below lose digits, or are zero.
-LEAST_SQUARE = 2.0 ** -1000
+MIN_SQUARE = 2.0 ** -1000
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class Arm:
     def divisor(self) -> Real:
         """Its square, NaN where it has no direction."""
         return self.square if self.length or self._is_smooth else \
-            valid_where(self.square, self._clear - LEAST_SQUARE)
+            valid_where(self.square, self._clear - MIN_SQUARE)
 
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
@@ -222,9 +222,9 @@ class CrankArm(Arm):
         self._crank, self._turn, self._is_reversed = crank, turn, reverse
         self._g, self._m, self._s, self._h, self._is_smooth = g, m, s, h, smooth
         # The arm between two equal lengths bisects them, also where it has no length itself.
-        turning = where(is_isosceles, 0.5,
-                        m * ((m - g) + 2.0 * g * square(h)) / self.square)
-        vector.spin = Rate((crank.angle,), lambda rate: rate * turning)
+        spin_ratio = where(is_isosceles, 0.5,
+                           m * ((m - g) + 2.0 * g * square(h)) / self.square)
+        vector.spin = Rate((crank.angle,), lambda rate: rate * spin_ratio)
         self.vector = -vector if reverse else vector
 
     def within(self, radius: Real, size: Real) -> Limit:
@@ -237,10 +237,10 @@ class CrankArm(Arm):
 
     def difference(self, first: Real, second: Real, shorter: Limit) -> Real:
         """Return `first - second`, or its like in the arm where the limit takes both as equal."""
-        apart, own = exact_sum(first, -second), abs(self._g - self._m)
+        difference, shortest = exact_sum(first, -second), abs(self._g - self._m)
         return where(abs(shorter.ends.end) <= shorter.tolerance,
-                     where(apart < 0.0, -own, own), apart
-                     ) if shorter.smooth and shorter.ends else apart
+                     where(difference < 0.0, -shortest, shortest), difference
+                     ) if shorter.smooth and shorter.ends else difference
 
     def offset(self, point: Complex, to_point: Complex) -> Real:
         """Return the cross product of the arm and the vector from its foot to a point."""
@@ -256,13 +256,13 @@ class CrankArm(Arm):
         gm = 4.0 * g * m
         start = sign * (exact_sum(radius, -g, -m) * exact_sum(radius, g, m))
         end = sign * (exact_sum(radius, -g, m) * exact_sum(radius, g, -m))
-        # The margin can vanish only next to the smaller gap.
+        # The margin can vanish only next to its smaller value at an end.
         margin = where(abs(start) <= abs(end), start + sign * gm * square(s),
                        end - sign * gm * square(h))
         tolerance = TOLERANCE * abs(radius) * (size + g + m)
-        gap, half = (start, s) if sign > 0.0 else (end, h)
+        least_margin, half = (start, s) if sign > 0.0 else (end, h)
         grown = square_root(gm) * self._first_sign(sign)
-        smooth = where(abs(gap) <= tolerance, grown * half, root(margin, tolerance))
+        smooth = where(abs(least_margin) <= tolerance, grown * half, root(margin, tolerance))
         return Limit(margin, tolerance, smooth if self._is_smooth else None, CrankEnds(
             start, end, arctangent(self._turn.y, self._turn.x), self._crank.angle))
 
@@ -303,15 +303,15 @@ def dyad(arm: Arm, first: Real, second: Real, side: float) -> Dyad:
     """
     radius = first + second
     limits = arm.within(radius, radius), arm.beyond(first - second, radius)
-    apart = arm.difference(first, second, limits[1])
+    difference = arm.difference(first, second, limits[1])
     v = _height(arm, limits, side)
-    skew = _nan_with(v, arm.vector, apart * radius / (2.0 * arm.divisor))
-    u, turning = 0.5 + skew, spin(arm.vector)
+    skew = _nan_with(v, arm.vector, difference * radius / (2.0 * arm.divisor))
+    u, arm_spin = 0.5 + skew, spin(arm.vector)
 
     def bar(along: Real, length: Real) -> Complex:
         """Return the product of along + i v and the arm, whose spin it adds to its own."""
         return with_spin(arm.vector * Complex(along, v), Rate(
-            (v, skew, *turning.of), lambda dv, dskew, *rates: turning.formula(*rates) + (
+            (v, skew, *arm_spin.of), lambda dv, dskew, *rates: arm_spin.formula(*rates) + (
                 (along * dv - v * dskew) * arm.square / square(length))))
 
     return Dyad(bar(u, first), bar(skew - 0.5, second), limits)
@@ -340,12 +340,12 @@ def extended(arm: Arm, first: Real, second: Real, side: float, longest: Real) ->
     twice = where(square(first) <= arm.square, power + square(first),
                   (first - second) * (first + second) + arm.square)
     u = _nan_with(v, arm.vector, twice / (2.0 * arm.divisor))
-    growth, turning = _growth(arm, first, second, v), spin(arm.vector)
+    growth, arm_spin = _growth(arm, first, second, v), spin(arm.vector)
 
     def with_growing(bar: Complex, grown: Real, widened: Real) -> Complex:
         """Add a bar's spin to the arm's, from the rates of the cylinder and the arm's square."""
         return with_spin(bar, Rate(
-            (first, arm.square, *turning.of), lambda dc, dw, *rates: turning.formula(*rates) - (
+            (first, arm.square, *arm_spin.of), lambda dc, dw, *rates: arm_spin.formula(*rates) - (
                 growth * (dc * grown + dw * widened / (4.0 * first * arm.square)))))
 
     return Dyad(with_growing(arm.vector * Complex(u, v) / first, 0.5 - 0.5 * power / square(first),
@@ -364,10 +364,10 @@ def _growth(arm: Arm, first: Real, second: Real, v: Real) -> Real:
     growth = first / (v * arm.square)
     if (d := arm.length) is None:
         return growth
-    apart = (second - d, second + d)
+    ends = (second - d, second + d)
     return with_rate(growth, first, formula=lambda rate: growth * rate * (
-        first / ((apart[1] - first) * (apart[1] + first))
-        - square(apart[0]) / (first * (first - apart[0]) * (first + apart[0]))))
+        first / ((ends[1] - first) * (ends[1] + first))
+        - square(ends[0]) / (first * (first - ends[0]) * (first + ends[0]))))
 
 
 def _nan_with(other: Real, vector: Complex, part: Real) -> Real:
@@ -384,13 +384,14 @@ def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
     The base is |PQ|, first and second are the corner's distances from P and Q [m]; left of
     P -> Q for side = +1. NaN where no such triangle exists.
     """
-    gaps = (exact_sum(first, second, -base) * exact_sum(first, second, base),
-            exact_sum(base, -first, second) * exact_sum(base, first, -second))
+    margins = (exact_sum(first, second, -base) * exact_sum(first, second, base),
+               exact_sum(base, -first, second) * exact_sum(base, first, -second))
     twice, sides = 2.0 * square(base), first + second
-    # Sides that are flat up to rounding, which moves a factor of a gap, are flat.
-    near, far = (root(where(abs(gap) <= tolerance, 0.0, gap), tolerance) for gap, tolerance in zip(
-        gaps, (TOLERANCE * square(sides), TOLERANCE * sides * base)))
-    return Complex(0.5 + squares_apart(first, second) / twice, near * far / twice * side)
+    # Sides that are flat up to rounding, which moves a factor of a margin, are flat.
+    within, beyond = (root(where(abs(margin) <= tolerance, 0.0, margin), tolerance)
+                      for margin, tolerance in zip(margins, (
+                          TOLERANCE * square(sides), TOLERANCE * sides * base)))
+    return Complex(0.5 + squares_apart(first, second) / twice, within * beyond / twice * side)
 
 
 def mirror(arm: Arm, image: Complex, offset: Real, ends: Sequence[Complex]) -> tuple[Complex, ...]:
@@ -400,44 +401,44 @@ def mirror(arm: Arm, image: Complex, offset: Real, ends: Sequence[Complex]) -> t
     `offset` is the point's offset from the arm. `ends` are the bars to the point from the arm's
     foot and from its end. The spin of a bar's image is twice the arm's minus the bar's own.
     """
-    across, turning, bars = arm.across(offset), spin(arm.vector), []
+    across, arm_spin, bars = arm.across(offset), spin(arm.vector), []
     for bar in ends:
         bar_spin = spin(bar)
         bars.append(with_spin(bar + across, Rate(
-            (*turning.of, *bar_spin.of), lambda *rates, bar_spin=bar_spin: valid_where(
-                2.0 * turning.formula(*rates[:len(turning.of)])
-                - bar_spin.formula(*rates[len(turning.of):]), abs(image.x + image.y)))))
+            (*arm_spin.of, *bar_spin.of), lambda *rates, bar_spin=bar_spin: valid_where(
+                2.0 * arm_spin.formula(*rates[:len(arm_spin.of)])
+                - bar_spin.formula(*rates[len(arm_spin.of):]), abs(image.x + image.y)))))
     return with_velocity(image, arm.foot, bars[0]), *bars
 
 
 def parallel(bar: Complex, place: Complex) -> Complex:
     """Return a bar equal to another one, NaN where the place of its end is NaN."""
-    turning = spin(bar)
+    bar_spin = spin(bar)
     same = Complex(*(valid_where(part, abs(place.x)) for part in (bar.x, bar.y)))
-    same.spin = Rate(turning.of, lambda *rates: valid_where(
-        turning.formula(*rates), abs(place.x)))
+    same.spin = Rate(bar_spin.of, lambda *rates: valid_where(
+        bar_spin.formula(*rates), abs(place.x)))
     return same
 
 
 def with_velocity(place: Complex, start: Complex, bar: Complex) -> Complex:
     """Return a place with the velocity of the end of a bar of constant length on `start`."""
-    turning = spin(bar)
+    bar_spin = spin(bar)
     return Complex(
-        with_rate(place.x, start.x, *turning.of,
-                  formula=lambda rate, *rates: rate - turning.formula(*rates) * bar.y),
-        with_rate(place.y, start.y, *turning.of,
-                  formula=lambda rate, *rates: rate + turning.formula(*rates) * bar.x))
+        with_rate(place.x, start.x, *bar_spin.of,
+                  formula=lambda rate, *rates: rate - bar_spin.formula(*rates) * bar.y),
+        with_rate(place.y, start.y, *bar_spin.of,
+                  formula=lambda rate, *rates: rate + bar_spin.formula(*rates) * bar.x))
 
 
-def transmission(found: Dyad) -> Real:
+def transmission(dyad: Dyad) -> Real:
     """
     Return the angle [rad] in [0, pi] between the two bars of a dyad, at their joint.
 
     With the arm w, tan^2(mu/2) = (|w|^2 - (r1 - r2)^2) / ((r1 + r2)^2 - |w|^2).
     """
-    if not found.limits:
-        return arctangent(abs(cross(found.first, found.second)), dot(found.first, found.second))
-    within, beyond = found.limits
+    if not dyad.limits:
+        return arctangent(abs(cross(dyad.first, dyad.second)), dot(dyad.first, dyad.second))
+    within, beyond = dyad.limits
     return 2.0 * arctangent(beyond.root(), within.root())
 
 
@@ -469,9 +470,9 @@ def slot(arm: Arm, offset: Real, half: float) -> tuple[Complex, Real, Limit]:
     central, aside = abs(offset) <= 0.0, arm.vector * Complex(slide, -offset)
     along = Complex(*(valid_where(where(central, way * half, part), arm.divisor)
                       for way, part in ((arm.vector.x, aside.x), (arm.vector.y, aside.y))))
-    turning = spin(arm.vector)
+    arm_spin = spin(arm.vector)
     return with_spin(along.direction(), Rate(
-        (slide, *turning.of), lambda rate, *rates: turning.formula(*rates) + where(
+        (slide, *arm_spin.of), lambda rate, *rates: arm_spin.formula(*rates) + where(
             central, 0.0, offset * rate / arm.divisor))), slide, limit
 
 
@@ -517,12 +518,12 @@ class CrankRail(Rail):
         return (self._limit(rod, low, high, low, s, behind),
                 self._limit(rod, far, near, near, h, behind))
 
-    def _limit(self, rod: Real, start: Real, end: Real, gap: Real, half: Real,
+    def _limit(self, rod: Real, start: Real, end: Real, least_margin: Real, half: Real,
                sign: Real) -> Limit:
-        margin = gap + 2.0 * self._crank.length * square(half)
+        margin = least_margin + 2.0 * self._crank.length * square(half)
         tolerance = TOLERANCE * (rod + self._magnitude)
         grown = square_root(2.0 * self._crank.length) * sign
-        smooth = where(abs(gap) <= tolerance, grown * half, root(margin, tolerance))
+        smooth = where(abs(least_margin) <= tolerance, grown * half, root(margin, tolerance))
         return Limit(margin, tolerance, smooth, CrankEnds(
             start, end, arctangent(self._turn.y, self._turn.x), self._crank.angle))
 

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple, Sequence
 
-from .planar import LEAST_SQUARE, Limit, TINY
+from .planar import Limit, MIN_SQUARE, TINY
 from ..tolerances import TOLERANCE
 from ...formula.expression import (
     arctangent,
@@ -49,7 +49,7 @@ LAST_STEP = 2.0 ** -23
 EDGE = 2.0 ** -30
 # What formulas count as rounding, and what that is in single precision.
 IN_SINGLE = {TOLERANCE: 8 * 2.0 ** -24, -TOLERANCE: -8 * 2.0 ** -24, LAST_STEP: 2.0 ** -11,
-             EDGE: 2.0 ** -17, TINY: 2.0 ** -26, LEAST_SQUARE: 2.0 ** -100}
+             EDGE: 2.0 ** -17, TINY: 2.0 ** -26, MIN_SQUARE: 2.0 ** -100}
 
 
 class Vector(NamedTuple):
@@ -239,8 +239,8 @@ def rod_on_slide(axis: Vector, pivot: Vector, end: Vector, length: Real, side: R
     reach = limit.root()
 
     def rate(dx: Real, dy: Real, dz: Real, dlength: Real) -> Real:
-        left = foot.minus(axis.times(place))
-        return (left.dot(Vector(dx, dy, dz)) - length * dlength) / (-(side * reach))
+        from_foot = foot.minus(axis.times(place))
+        return (from_foot.dot(Vector(dx, dy, dz)) - length * dlength) / (-(side * reach))
 
     place = with_rate(ahead + side * reach, *foot, length, formula=rate)
     return place, limit
@@ -312,7 +312,7 @@ def row(pivot: Vector, end: Circle, pose: HingeAngles) -> Row:
     return Row(rod, pivot.x * place.y - pivot.y * place.x, -rod.dot(ahead))
 
 
-def gap(rod: Vector, length: Scalar) -> Scalar:
+def residual(rod: Vector, length: Scalar) -> Scalar:
     """Return half the difference between the square of a rod's vector and of its length."""
     return 0.5 * (rod.dot(rod) - length * length)
 
@@ -321,7 +321,7 @@ def newton_step(rods: Sequence[tuple[Vector, Circle, Scalar]],
                 pose: HingeAngles) -> tuple[HingeAngles, Scalar]:
     """Return the pose after a Newton step towards the fit of two rods, and the step [rad]."""
     rows = [row(pivot, end, pose) for pivot, end, _ in rods]
-    d1, d2 = _solution(rows, [-gap(each.rod, rod[2]) for each, rod in zip(rows, rods)])
+    d1, d2 = _solution(rows, [-residual(x.rod, length) for x, (_, _, length) in zip(rows, rods)])
     return (*_stepped(*pose[:2], d1), *_stepped(*pose[2:], d2)), abs(d1) + abs(d2)
 
 
@@ -343,8 +343,8 @@ def two_rods(rods: Sequence[Rod], start: Sequence[Real]) -> tuple[Turn, Turn, Li
             pose = first.cosine, first.sine, second.cosine, second.sine
             final.extend(row(pivot, end, pose) for pivot, end, _ in bars)
         return _solution(final, [
-            length * rate - each.rod.dot(Vector(*moving)) for each, (_, _, length), moving, rate
-            in zip(final, bars, (changes[:3], changes[4:7]), (changes[3], changes[7]))])
+            length * rate - x.rod.dot(Vector(*moving)) for x, (_, _, length), moving, rate in zip(
+                final, bars, (changes[:3], changes[4:7]), (changes[3], changes[7]))])
 
     of = tuple(x for pivot, _, length in bars for x in (*pivot, length))
     first, second = (turn_with_rate(s, c, c, s, Rate(

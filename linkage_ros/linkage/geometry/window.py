@@ -30,7 +30,7 @@ from .spatial import Circle, EDGE, HingeAngles, LAST_STEP, newton_step, row, STE
 from ..tolerances import ROUNDING, SINGULAR
 
 # The most pairs of boxes that a proof examines, and each trial in a search for a rectangle.
-MOST_PAIRS, MOST_IN_SEARCH = 50_000, 4_000
+MAX_PAIRS, MAX_IN_SEARCH = 50_000, 4_000
 # Newton's method is tried for this many poses per side of the rectangle. Its error [rad] one step
 # before the last is well below LAST_STEP, so that it converges between these poses, too.
 POSES, CONVERGED = 33, 0.01 * LAST_STEP
@@ -113,32 +113,32 @@ class WindowRod(NamedTuple):
         reach = np.sqrt(x * x + y * y)
         radial, tangent = (u.times(a / reach / rho).plus(v.times(b / reach / rho))
                            for a, b in ((x, y), (-y, x)))
-        near, aside = reach - moved(radial) - rest, moved(tangent) + rest
-        far = np.hypot(2.0 * reach - near, aside)
+        shortest, aside = reach - moved(radial) - rest, moved(tangent) + rest
+        longest = np.hypot(2.0 * reach - shortest, aside)
         along = square + 0.5 * (rho * rho - self.length ** 2)
         slack = slack + ROUNDING * self.length ** 2
-        least, most = ((along + way * slack) / (rho * np.where(
-            (along + way * slack) * way >= 0.0, near, far)) for way in (-1.0, 1.0))
-        first, last = (np.arccos(np.clip(cos, -1.0, 1.0)) for cos in (most, least))
-        turn = np.arctan2(aside, near) + SINGULAR
-        none = (least > 1.0) | (most < -1.0)
+        lower, upper = ((along + way * slack) / (rho * np.where(
+            (along + way * slack) * way >= 0.0, shortest, longest)) for way in (-1.0, 1.0))
+        first, last = (np.arccos(np.clip(cos, -1.0, 1.0)) for cos in (upper, lower))
+        turn = np.arctan2(aside, shortest) + SINGULAR
+        none = (lower > 1.0) | (upper < -1.0)
         middle = np.arctan2(y, x) + self.side * 0.5 * (first + last)
         half = np.minimum(0.5 * (last - first) + turn, math.pi)
-        return Boxes(middle, np.select([near <= 0.0, none], [math.pi, np.nan], half))
+        return Boxes(middle, np.select([shortest <= 0.0, none], [math.pi, np.nan], half))
 
-    def shared(self, one: Boxes, other: Boxes) -> Boxes:
+    def shared(self, first: Boxes, second: Boxes) -> Boxes:
         """Return the motor's values that ranges share with others, or more; NaN for none."""
-        start = other.middle
+        start = second.middle
         if self.is_on_crank:
-            start = start - math.tau * np.round((start - one.middle) / math.tau)
-        low = np.maximum(one.middle - one.half, start - other.half)
-        high = np.minimum(one.middle + one.half, start + other.half)
+            start = start - math.tau * np.round((start - first.middle) / math.tau)
+        low = np.maximum(first.middle - first.half, start - second.half)
+        high = np.minimum(first.middle + first.half, start + second.half)
         half = np.where(low <= high, 0.5 * (high - low), np.nan)
         # Large ranges of angles may meet at both of their ends.
-        wide = self.is_on_crank & (one.half + other.half > math.pi - SINGULAR)
-        smaller = np.where(one.half <= other.half, one.middle, start)
+        wide = self.is_on_crank & (first.half + second.half > math.pi - SINGULAR)
+        smaller = np.where(first.half <= second.half, first.middle, start)
         return Boxes(np.where(wide, smaller, 0.5 * (low + high)),
-                     np.where(wide, np.minimum(one.half, other.half), half))
+                     np.where(wide, np.minimum(first.half, second.half), half))
 
     def directions(self, motors: Boxes, poses: Boxes) -> Boxes:
         """Return the directions [rad] of gradients in boxes of motor values and of poses."""
@@ -191,16 +191,16 @@ class Window:
             ends = (np.ceil(10.0 * np.degrees(self.middle - half)),
                     np.floor(10.0 * np.degrees(self.middle + half)))
             tried = Window(self.rods, *np.radians(0.1 * np.array(ends)))
-            if (tried.low < tried.high).all() and tried.is_proved(MOST_IN_SEARCH):
+            if (tried.low < tried.high).all() and tried.is_proved(MAX_IN_SEARCH):
                 size, best = size + step, tried
             step *= 0.5
         return best
 
-    def is_proved(self, most: int = MOST_PAIRS) -> bool:
+    def is_proved(self, most: int = MAX_PAIRS) -> bool:
         """Return whether it has one pose at most, by proof, and Newton's method finds it."""
         return self._is_found() and not self.undecided(most)[0].size
 
-    def undecided(self, most: int = MOST_PAIRS) -> tuple[np.ndarray, np.ndarray]:
+    def undecided(self, most: int = MAX_PAIRS) -> tuple[np.ndarray, np.ndarray]:
         """Return the middles (2, n) of pairs of boxes that may have two poses of some motors."""
         # A little beyond the edges.
         middle, half = self.middle[:, None], 0.5 * (self.high - self.low) + 2.0 * EDGE
@@ -225,17 +225,17 @@ class Window:
 
     def _is_open(self, boxes: Boxes, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """Return whether pairs of boxes may have two poses of some motors."""
-        one, other = boxes.middle[:, first], boxes.middle[:, second]
-        around = Boxes(0.5 * (one + other), boxes.half[:, None] + 0.5 * abs(one - other))
+        start, end = boxes.middle[:, first], boxes.middle[:, second]
+        around = Boxes(0.5 * (start + end), boxes.half[:, None] + 0.5 * abs(start - end))
         with np.errstate(all='ignore'):
             ranges = [rod.ranges(boxes) for rod in self.rods]
             shared = [rod.shared(motors.some(first), motors.some(second))
                       for rod, motors in zip(self.rods, ranges)]
             right, left = (
                 rod.directions(motors, around) for rod, motors in zip(self.rods, shared))
-            away = np.mod(right.middle - left.middle, math.pi)
-            apart = np.minimum(away, math.pi - away) > right.half + left.half + SINGULAR
-        return ~(apart | np.isnan(shared[0].half) | np.isnan(shared[1].half))
+            angle = np.mod(right.middle - left.middle, math.pi)
+            differ = np.minimum(angle, math.pi - angle) > right.half + left.half + SINGULAR
+        return ~(differ | np.isnan(shared[0].half) | np.isnan(shared[1].half))
 
     def second_pose(self) -> tuple[tuple[float, float], Sequence[np.ndarray]] | None:
         """
@@ -246,8 +246,8 @@ class Window:
         start, other = (ends.clip(self.low[:, None], self.high[:, None])
                         for ends in self.undecided())
         # Not more than Newton's method can try at once.
-        apart = np.abs(start - other).max(axis=0)
-        some = np.argsort(-apart, kind='stable')[::max(1, len(apart) // TRIED)]
+        distance = np.abs(start - other).max(axis=0)
+        some = np.argsort(-distance, kind='stable')[::max(1, len(distance) // TRIED)]
         start, other = start[:, some], other[:, some]
         with np.errstate(all='ignore'):
             motors = [rod.motors(start) for rod in self.rods]
@@ -258,10 +258,10 @@ class Window:
             good &= [abs(np.exp(1j * reached) - np.exp(1j * motor)) < CONVERGED if rod.is_on_crank
                      else abs(reached - motor) < CONVERGED * motor
                      for rod, reached, motor in zip(self.rods, again, motors)]
-        apart = np.abs(solved - start).max(axis=0) * good.all(axis=0)
-        if not (apart > DISTINCT).any():
+        distance = np.abs(solved - start).max(axis=0) * good.all(axis=0)
+        if not (distance > DISTINCT).any():
             return None
-        i = int(np.nanargmax(apart))
+        i = int(np.nanargmax(distance))
         return (motors[0][i], motors[1][i]), (start[:, i], solved[:, i])
 
     def _is_found(self) -> bool:
@@ -270,8 +270,8 @@ class Window:
         poses = np.stack(np.meshgrid(*axes)).reshape(2, -1)
         with np.errstate(all='ignore'):
             motors = np.array([rod.motors(poses) for rod in self.rods])
-            there = ~np.isnan(motors).any(axis=0)
-            poses, motors = poses[:, there], motors[:, there]
+            assembled = ~np.isnan(motors).any(axis=0)
+            poses, motors = poses[:, assembled], motors[:, assembled]
             solved = self._closed([rod.bar(motor) for rod, motor in zip(self.rods, motors)],
                                   self.middle, STEPS - 1)
         # A NaN fails this comparison.

@@ -105,8 +105,8 @@ class Choice:
         n = problem.n
         solution = [*islice(numbers, n)], [*islice(numbers, n * n)]
         seed = [*islice(numbers, n * follows)]
-        state = ranked(problem, *solution, seed, [[*islice(numbers, 2 * each)]
-                                                  for each in limited])
+        state = ranked(problem, *solution, seed, [[*islice(numbers, 2 * ends)]
+                                                  for ends in limited])
         best = better(state, [[*islice(numbers, len(part))] for part in state])
         return problem.linkage.bind(Program([*chain(*best)], next(numbers).args[0])), [
             math.nan] * sum(map(len, best))
@@ -115,17 +115,17 @@ class Choice:
         """Return the chosen one of solutions, NaN if there is none; limits are () or two ends."""
         code, best = self._codes[len(seed) > 0, tuple(map(bool, limits))]
         better = code.searched if isinstance(solutions, np.ndarray) else code.at
-        given = *seed, *chain(*limits)
+        fixed = *seed, *chain(*limits)
         for solution in solutions:
-            best = better(*solution, *given, *best)
+            best = better(*solution, *fixed, *best)
         return best[-self._problem.n * (self._problem.n + 1):]
 
     def along(self, solutions: np.ndarray, seed: Sequence[float],
               limits: Sequence[Sequence[float]]) -> np.ndarray:
         """Return for columns of solutions the nearest one to that of the column before."""
-        found = np.full(solutions.shape[1:], math.nan)
-        for chosen, column in zip(found.T, np.moveaxis(solutions, 2, 0).tolist()):
+        path = np.full(solutions.shape[1:], math.nan)
+        for chosen, column in zip(path.T, np.moveaxis(solutions, 2, 0).tolist()):
             chosen[:] = self.of([row for row in column if row[0] == row[0]], seed, limits)
             if chosen[0] == chosen[0]:
                 seed = chosen[:self._problem.n].tolist()
-        return found
+        return path

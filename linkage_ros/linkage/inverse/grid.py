@@ -57,7 +57,7 @@ class Grid:
         if place is not None:
             others = tuple(held[by] for by in range(1, problem.n))
             for candidate in segments_of(problem.linkage, problem.outputs[place],
-                                       others).candidates(values[place:place + 1]):
+                                         others).candidates(values[place:place + 1]):
                 yield candidate._replace(inputs=candidate.inputs + others)
         else:
             solutions = self._descended(self._starts(held, values), values)
@@ -118,9 +118,9 @@ class Grid:
         n, parts, reached = self._problem.n, np.ones(len(q)), [q[:0]]
         solved = self._solved(q, values)
         for _ in range(HALVINGS):
-            there = solved[1] <= ACCEPTED
-            reached.append(q[there])
-            going = ~there & (parts > SINGULAR) & np.isfinite(solved[2 + n:2 + 2 * n]).all(axis=0)
+            final = solved[1] <= ACCEPTED
+            reached.append(q[final])
+            going = ~final & (parts > SINGULAR) & np.isfinite(solved[2 + n:2 + 2 * n]).all(axis=0)
             if not going.any():
                 break
             q, solved, parts = q[going], solved[:, going], parts[going]

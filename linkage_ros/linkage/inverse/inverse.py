@@ -66,7 +66,7 @@ class Solution(NamedTuple):
         of d outputs / d inputs. 0 where rounding hides the sign.
         """
         linkage, signs = self.inverse.linkage, {}
-        cranks = [input_.name for input_ in linkage.inputs if input_.turns]
+        cranks = [input_.name for input_ in linkage.inputs if input_.is_angle]
         angles = linkage.joint_angles(theta_of(self.inputs))
         for link in linkage.links if linkage.axes == 'xy' else ():
             if link.parent in cranks and link.kind == 'revolute' and any(
@@ -268,8 +268,8 @@ class Inverse:
             solutions, alone = solve_arrays(self.problem, values, source.candidate_arrays)
         rows = [self._all(column[:n], column[n:])
                 for column in map(tuple, np.vstack([values, *seed]).T[alone].tolist())]
-        most = max([1, len(solutions), *map(len, rows)])
-        solutions = np.pad(solutions, ((0, most - len(solutions)), (0, 0), (0, 0)),
+        size = max([1, len(solutions), *map(len, rows)])
+        solutions = np.pad(solutions, ((0, size - len(solutions)), (0, 0), (0, 0)),
                            constant_values=math.nan)
         for k, row in zip(alone.tolist(), rows):
             solutions[:, :, k] = math.nan

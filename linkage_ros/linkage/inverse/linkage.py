@@ -233,8 +233,8 @@ class _Sketch(Dyads):
         """Add bodies that measure an output other than a joint's value."""
         if pair := PAIR.fullmatch(output):
             first, second = pair.groups()
-            apart = self._place(second) - self._place(first)
-            along = apart / abs(apart) if apart else 1.0 + 0.0j
+            vector = self._place(second) - self._place(first)
+            along = vector / abs(vector) if vector else 1.0 + 0.0j
             self.motors.append(self._aimed(output, first, second, along) if output.startswith(
                 'angle') else Slide((self._pin(first, f'{output} barrel', along),
                                      self._pin(second, f'{output} rod', along)),

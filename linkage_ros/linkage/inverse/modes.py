@@ -61,7 +61,7 @@ def modes_of(problem: InverseProblem, closed: InverseLinkage | None) -> list[tup
     """
     if not closed:
         raise ValueError(f'{join_names(problem.outputs)}: no closed form is known, only a search')
-    modes, forward = [], problem.linkage.structure.checked(problem.outputs)
+    modes, forward = [], problem.linkage.formulas.checked(problem.outputs)
     for inputs in closed.solutions():
         results = substituted(forward, dict(enumerate(inputs)))
         for by, (turn, scale) in enumerate(zip(problem.periods, problem.scales)):

@@ -94,7 +94,7 @@ class InverseProblem:
     def newton(self) -> CompiledFunction:
         """Return the code for a step of Newton's method; see `newton`."""
         linkage = self.linkage
-        program = newton(linkage.structure, self.outputs, tuple(self.periods), tuple(self.turns))
+        program = newton(linkage.formulas, self.outputs, tuple(self.periods), tuple(self.turns))
         return program.bind({**linkage.dimensions, UNIT_LENGTH: linkage.longest, **{
             f'[{input_.name}]': size for input_, size in zip(self.inputs, self.sizes)}}, {},
             linkage.is_accelerated)
@@ -133,7 +133,7 @@ def nearest(x: Real, seed: Real, turn: float) -> Real:
 
 
 @cached(64, shared=True)
-def newton(structure: LinkageFormulas, outputs: tuple[str, ...], periods: Sequence[float],
+def newton(formulas: LinkageFormulas, outputs: tuple[str, ...], periods: Sequence[float],
            turns: Sequence[float]) -> Program:
     """
     Return the code for a step of Newton's method, from the inputs and values of the outputs.
@@ -144,32 +144,32 @@ def newton(structure: LinkageFormulas, outputs: tuple[str, ...], periods: Sequen
     """
     n, inputs = len(outputs), [argument(by) for by in range(len(outputs))]
     # Of one input, candidates are inside the reach.
-    rows = structure.checked(outputs) if n > 1 else structure.parts(((), outputs, outputs))
-    scales = [real(1.0) if structure.is_angle(name) else dimension(UNIT_LENGTH)
+    rows = formulas.checked(outputs) if n > 1 else formulas.parts(((), outputs, outputs))
+    scales = [real(1.0) if formulas.is_angle(name) else dimension(UNIT_LENGTH)
               for name in outputs]
-    sizes = [real(1.0) if input_.turns else dimension(f'[{input_.name}]')
-             for input_ in structure.built.inputs]
-    gaps = [nearest(row - argument(n + by), real(0.0), turn) / scale
-            for by, (row, turn, scale) in enumerate(zip(rows, periods, scales))]
+    sizes = [real(1.0) if input_.is_angle else dimension(f'[{input_.name}]')
+             for input_ in formulas.built.inputs]
+    errors = [nearest(row - argument(n + by), real(0.0), turn) / scale
+              for by, (row, turn, scale) in enumerate(zip(rows, periods, scales))]
     # A row for each output, in units of outputs and inputs.
     jacobian = [[rate * size / scale for rate, size in zip(rows[n + by::n], sizes)]
                 for by, scale in enumerate(scales)]
     weights = [greater(abs(x) / size, real(1.0)) for x, size in zip(inputs, sizes)]
-    most = real(SINGULAR / ACCEPTED)
+    largest = real(SINGULAR / ACCEPTED)
     ratios = []
-    for gap, rates in zip(gaps, jacobian):
+    for error, rates in zip(errors, jacobian):
         rounding = sum((abs(rate) * weight for rate, weight in zip(rates, weights)), real(1.0))
         # Where a pose has no rates, they explain nothing.
-        ratios.append(abs(gap) / where(
-            rounding < most, rounding, where(most <= rounding, most, 1.0)))
+        ratios.append(abs(error) / where(
+            rounding < largest, rounding, where(largest <= rounding, largest, 1.0)))
     determinant, wrapped = _determinant(jacobian), []
-    steps = [_determinant([[*rates[:by], gap, *rates[by + 1:]]
-                           for gap, rates in zip(gaps, jacobian)]) for by in range(n)]
+    steps = [_determinant([[*rates[:by], error, *rates[by + 1:]]
+                           for error, rates in zip(errors, jacobian)]) for by in range(n)]
     for x, size, turn in zip(inputs, sizes, turns):
         x = nearest(where(abs(x) > MIN_ANGLE * size, x, 0.0), real(0.0), turn)
         wrapped.append(x if turn == math.inf else where(x < 0.5 * turn, x, -0.5 * turn))
     return Program([
-        sum(map(abs, gaps), real(0.0)), reduce(greater, ratios), *gaps,
+        sum(map(abs, errors), real(0.0)), reduce(greater, ratios), *errors,
         *(x - step * size / determinant for x, step, size in zip(inputs, steps, sizes)),
         *wrapped, *rows[n:]], 2 * n)
 

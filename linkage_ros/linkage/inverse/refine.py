@@ -114,19 +114,19 @@ def solve_arrays(problem: InverseProblem, values: np.ndarray,
     """
     n, over, values = problem.n, problem.newton.over, problem.reduced_arrays(values)
     numbers, places, candidates = candidate_arrays(values)
-    here = values[:, places]
+    goals = values[:, places]
     # What closed forms lose next to a singular pose; more is another assembly.
     low, high, inputs, far = -math.inf, math.inf, candidates, SINGULAR
     if n == 1:
         low, high, inputs, far = *candidates[:2], candidates[2:], math.inf
-    best = over(*inputs.clip(low, high), *here)
+    best = over(*inputs.clip(low, high), *goals)
     unclear = ~np.isfinite(best).all(axis=0)
     again = np.flatnonzero((best[0] > 0.0) & (best[0] <= far))
     for _ in range(HALVINGS):
         if not len(again):
             break
         x = best[2 + n:2 + 2 * n].clip(low, high)[:, again]
-        trial = over(*x, *here[:, again])
+        trial = over(*x, *goals[:, again])
         better = trial[0] < best[0, again]
         again = again[better]
         best[:, again] = trial[:, better]
@@ -136,7 +136,7 @@ def solve_arrays(problem: InverseProblem, values: np.ndarray,
     order = np.lexsort(solutions[:, :n].swapaxes(0, 1)[::-1], axis=0)
     solutions = np.take_along_axis(solutions, order[:, None], 0)
     pairs = np.triu_indices(len(solutions), 1)
-    distances = np.max([input_.apart(*(solutions[k, by] for k in pairs)) / size for by, (
+    distances = np.max([input_.distance(*(solutions[k, by] for k in pairs)) / size for by, (
         input_, size) in enumerate(zip(problem.inputs, problem.sizes))], axis=0)
     alone = (distances <= SINGULAR).any(axis=0)
     alone[places[(unclear | ~is_solved) & ~(best[0] > far)]] = True

@@ -29,8 +29,8 @@ def decompose(linkage: Kinematics, outputs: Names) -> InverseLinkage | None:
             return None
         # Solved once for all modes: the sides are arguments here, and constants in each mode.
         leaves = {rod: argument(n + i) for i, rod in enumerate(rods)}
-        structure = LinkageFormulas(design, {**linkage.branches, **leaves})
-        values = [structure.output(input_.name) for input_ in linkage.inputs]
+        formulas = LinkageFormulas(design, {**linkage.branches, **leaves})
+        values = [formulas.output(input_.name) for input_ in linkage.inputs]
         modes = {sides: tuple(substituted(values, dict(zip(leaves.values(), map(real, sides)))))
                  for sides in product((1.0, -1.0), repeat=len(rods))}
         return InverseLinkage(design.joints, {name: (name, 1.0, 0.0) for name in outputs}, rods,

@@ -53,8 +53,8 @@ class Segment(NamedTuple):
     def candidate(self, target: float) -> Candidate:
         """Return the candidate of a value of the range, times the sign."""
         i = bisect_right(self.value, target, 1, len(self.value) - 1)
-        (low, high), (least, greatest) = self.theta[i - 1:i + 1], self.value[i - 1:i + 1]
-        part = (target - least) / (greatest - least) if greatest > least else 0.5
+        (low, high), (first, last) = self.theta[i - 1:i + 1], self.value[i - 1:i + 1]
+        part = (target - first) / (last - first) if last > first else 0.5
         return Candidate((low + part * (high - low),), low, high)
 
 
@@ -76,7 +76,7 @@ class Segments:
         normalized = first.normalized()
         # Where a dyad is at a dead point, or nearly is.
         marks = normalized.distinct(
-            x.value for x in analysis.near_zeros() if x.gap <= NEAR * x.size)
+            x.value for x in analysis.near_zeros() if x.distance <= NEAR * x.size)
         # Next to an end of the reach there is a pose also when turns are added, and behind gears.
         farthest = math.pi if first.is_part else normalized.high
         offset = math.tau * abs(dict(linkage.design.turned).get(first.name, 0.0)) / self._unit
@@ -102,8 +102,8 @@ class Segments:
         """
         theta, value, sign = self.all[number]
         slack = self._slack(number, 0), self._slack(number, -1)
-        near = np.minimum(slack, ONE * self._size)
-        inner = value.clip(value[0] + near[0], value[-1] - near[1])
+        margin = np.minimum(slack, ONE * self._size)
+        inner = value.clip(value[0] + margin[0], value[-1] - margin[1])
         return Segment((np.pad(theta, 1, 'edge') * self._unit).tolist(), [
             float(value[0] - slack[0]), *inner.tolist(), float(value[-1] + slack[1])], sign)
 
@@ -111,15 +111,15 @@ class Segments:
 
     def candidates(self, values: Sequence[float]) -> list[Candidate]:
         """Return a candidate for each input that has the value."""
-        found, period = [], self._period
+        candidates, period = [], self._period
         for segment in self._answers:
             low, target = segment.value[0], segment.sign * values[0]
             if period < math.inf and not low <= target < low + period:
                 target += period * math.ceil((low - target) / period)
             while low <= target <= segment.value[-1]:
-                found.append(segment.candidate(target))
+                candidates.append(segment.candidate(target))
                 target += period
-        return found
+        return candidates
 
     def candidate_arrays(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return numbers of brackets of a value, of values (1, m) that have them, and brackets."""
@@ -165,11 +165,11 @@ class Segments:
             end = -1 if target > answers.value[-1] else 0
             if (beyond := self._beyond(number, end)) is None:
                 break
-            here, there, number = self.all[number], self.all[beyond], beyond
+            current, following, number = self.all[number], self.all[beyond], beyond
             # The same value, or whole periods from it.
-            target += float(there.value[-1 - end] - here.value[end])
+            target += float(following.value[-1 - end] - current.value[end])
             turns += self._input.turns_of(
-                float(here.theta[end] - there.theta[-1 - end]) * self._unit)
+                float(current.theta[end] - following.theta[-1 - end]) * self._unit)
         return None
 
     # --- monotone pieces ---
@@ -187,24 +187,24 @@ class Segments:
         theta, value = np.reshape(cut, (-1, 2, 2)).swapaxes(0, 1)
         # At an end of the reach there may be a pose, too.
         end = self._ends[np.abs(np.subtract.outer(theta, self._ends)).argmin(axis=-1)]
-        there = value + self._difference(self._curve(end.ravel())[0].reshape(end.shape) - value)
-        is_end = (np.abs(end - theta) <= ROUNDING) & np.isfinite(there)
+        outer = value + self._difference(self._curve(end.ravel())[0].reshape(end.shape) - value)
+        is_end = (np.abs(end - theta) <= ROUNDING) & np.isfinite(outer)
         pieces = np.hstack([np.where(is_end, end, theta) * self._unit,
-                            np.where(is_end, there, value)])
+                            np.where(is_end, outer, value)])
         return pieces[pieces[:, 2] != pieces[:, 3]]
 
     # --- how they are found ---
 
-    def _difference(self, gap: Any) -> Any:
-        return gap if self._period == math.inf else gap - self._period * np.round(
-            gap / self._period)
+    def _difference(self, difference: Any) -> Any:
+        return difference if self._period == math.inf else difference - self._period * np.round(
+            difference / self._period)
 
     def _runs(self, lo: float, hi: float) -> Iterator[tuple]:
         """Yield samples as inputs, values and rates, cut where the output jumps."""
         theta = sampled(lo, hi)
-        most = MAX_SAMPLES + 4 * len(theta)
-        theta, jumped = self._divided(theta, most)
-        if len(theta) > most:
+        limit = MAX_SAMPLES + 4 * len(theta)
+        theta, jumped = self._divided(theta, limit)
+        if len(theta) > limit:
             return
         ulps = ULPS * np.spacing(np.abs(theta).clip(1e-3))
         around = (theta + ulps * np.array([[0.0], [1.0], [-1.0]])).clip(lo, hi)
@@ -220,7 +220,7 @@ class Segments:
                 yield (theta[run], np.unwrap(value[0, run], period=self._period) if self._period
                        < math.inf else value[0, run], rate[0, run])
 
-    def _divided(self, theta: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
+    def _divided(self, theta: np.ndarray, limit: int) -> tuple[np.ndarray, np.ndarray]:
         """Return samples that explain the output, and after which of them it jumps."""
         jumped = np.empty(0, int)
         value, rate = self._curve(theta)
@@ -231,15 +231,15 @@ class Segments:
                     float(np.nanmax(value) - np.nanmin(value)), CLOSE * self._size)
                 slopes = np.stack([rate[1:], rate[:-1]])
                 mean = 0.5 * width * slopes.sum(axis=0)
-                missed = np.abs(change - np.where(np.isfinite(mean), mean, 0.0))
-                wide = (width > SINGULAR) & (missed > ULPS * self._rounding)
+                residual = np.abs(change - np.where(np.isfinite(mean), mean, 0.0))
+                wide = (width > SINGULAR) & (residual > ULPS * self._rounding)
                 # Two extremes may hide where the change is less than half of what rates say.
-                hidden = (slopes[0] * slopes[1] > 0.0) & (missed > 0.5 * np.abs(mean))
-                place = np.flatnonzero((missed > JUMP * size) | wide & hidden)
+                hidden = (slopes[0] * slopes[1] > 0.0) & (residual > 0.5 * np.abs(mean))
+                place = np.flatnonzero((residual > JUMP * size) | wide & hidden)
             narrow = width[place] <= ROUNDING
             jumped = place[narrow & (np.abs(change[place]) > JUMP * size)]
             place = place[~narrow]
-            if not len(place) or len(theta) > most:
+            if not len(place) or len(theta) > limit:
                 return theta, jumped
             new = (theta[place, None] + width[place, None] * CUTS).ravel()
             new_value, new_rate = self._curve(new)
@@ -253,8 +253,8 @@ class Segments:
         widths = np.concatenate([np.gradient(theta) for theta, _, _ in runs])
         order, length = np.argsort(values), widths.sum()
         median = values[order[np.searchsorted(widths[order].cumsum(), 0.5 * length)]]
-        away = np.abs(self._difference(values - median)) > ULPS * self._rounding
-        return bool(widths[away].sum() > 0.1 * length)
+        differs = np.abs(self._difference(values - median)) > ULPS * self._rounding
+        return bool(widths[differs].sum() > 0.1 * length)
 
     def _monotone(self, theta: np.ndarray, value: np.ndarray, rate: np.ndarray
                   ) -> Iterator[Segment]:
@@ -280,22 +280,22 @@ class Segments:
         """Return how far beyond an end of a segment, 0 or -1, values are those of the end."""
         theta, value, sign = self.all[number]
         if (beyond := self._beyond(number, end)) is not None:
-            gap = self.all[beyond].value[-1 - end] - value[end]
-            return self._rounding + abs(self._difference(gap))
+            value_beyond = self.all[beyond].value[-1 - end] - value[end]
+            return self._rounding + abs(self._difference(value_beyond))
         # An end is a float, too: next to it the output may change quickly.
         ulps = ULPS * np.spacing(max(abs(theta[end]), 1.0))
-        beside = theta[end:end + 1 or None] + math.copysign(ulps, theta[-1 - end] - theta[end])
-        change = abs(self._difference(self._curve(beside)[0, 0] - sign * value[end]))
+        perturbed = theta[end:end + 1 or None] + math.copysign(ulps, theta[-1 - end] - theta[end])
+        change = abs(self._difference(self._curve(perturbed)[0, 0] - sign * value[end]))
         return float(np.fmin(np.fmax(change, CLOSE * self._size), SINGULAR * self._size))
 
     def _beyond(self, number: int, end: int) -> int | None:
         """Return the number of the segment on which the output goes on beyond an end, 0 or -1."""
         beyond = (number + (1 if end else -1)) % len(self.all)
-        here, there = self.all[number], self.all[beyond]
-        step = float(there.theta[-1 - end] - here.theta[end]) * self._unit
-        goes_on = there.sign == here.sign and abs(
+        segment, after = self.all[number], self.all[beyond]
+        step = float(after.theta[-1 - end] - segment.theta[end]) * self._unit
+        goes_on = after.sign == segment.sign and abs(
             step - self._input.turns_of(step)) <= ONE * self._unit and abs(
-                self._difference(there.value[-1 - end] - here.value[end])) <= CLOSE * self._size
+                self._difference(after.value[-1 - end] - segment.value[end])) <= CLOSE * self._size
         return beyond if goes_on else None
 
 

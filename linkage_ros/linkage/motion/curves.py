@@ -85,7 +85,7 @@ def near_misses(values: np.ndarray) -> np.ndarray:
                         & (0.0 <= sign * inner) & (sign * inner <= sign * bend), sign, 0.0)
 
 
-def turning_points(values: np.ndarray, rates: np.ndarray, least: float) -> np.ndarray:
+def turning_points(values: np.ndarray, rates: np.ndarray, rounding: float) -> np.ndarray:
     """
     Return the samples after which a curve has an extreme.
 
@@ -95,7 +95,7 @@ def turning_points(values: np.ndarray, rates: np.ndarray, least: float) -> np.nd
     rising = np.asarray(rates) >= 0.0
     places: list = []
     for i in np.flatnonzero(rising[1:] != rising[:-1]).tolist():
-        if places and abs(values[i] - values[places[-1]]) <= least:
+        if places and abs(values[i] - values[places[-1]]) <= rounding:
             places.pop()
         else:
             places.append(i)
@@ -118,8 +118,8 @@ def extremes(curve: Callable, lo: float, hi: float, is_angle: bool = False
     pairs = []
     for sign in (-1.0, 1.0):
         height = np.where(known, sign * value, -np.inf)
-        beside = np.pad(height, 1, constant_values=-np.inf)
-        best = np.flatnonzero((height >= beside[:-2]) & (height >= beside[2:]))
+        around = np.pad(height, 1, constant_values=-np.inf)
+        best = np.flatnonzero((height >= around[:-2]) & (height >= around[2:]))
         top = value[best, None]
 
         def depth(x: np.ndarray, sign: float = sign, top: np.ndarray = top) -> np.ndarray:

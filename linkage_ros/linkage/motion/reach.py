@@ -50,7 +50,7 @@ def over_first(linkage: Kinematics, kind: str, names: Any, others: tuple[float, 
 
 def _reach(linkage: Kinematics, others: tuple[float, ...]) -> list[Arc]:
     margins = over_first(linkage, 'margins', (), others)
-    limits, step = linkage.structure.built.limits, linkage.inputs[0].step
+    limits, step = linkage.formulas.built.limits, linkage.inputs[0].step
     # From here on the input is in units of its step.
     input_ = linkage.inputs[0].normalized()
 
@@ -175,8 +175,8 @@ def _crank_ends(limit: Limit, value: Callable) -> list[float]:
     assert limit.ends
     start, end, turn = map(value, limit.ends[:3])
     tolerance = value(limit.tolerance)
-    # A gap within rounding is a limit that is only touched; it may be the whole reach.
-    start, end = (0.0 if abs(gap) <= tolerance else gap for gap in (start, end))
+    # A margin within rounding is a limit that is only touched; it may be the whole reach.
+    start, end = (0.0 if abs(margin) <= tolerance else margin for margin in (start, end))
     if start * end > 0.0:
         return []
     half = math.atan2(math.sqrt(abs(start)), math.sqrt(abs(end)))

@@ -33,7 +33,7 @@ class NearZero(NamedTuple):
     """A value of an input, how near a closure comes to zero there, its rounding and its size."""
 
     value: float
-    gap: float
+    distance: float
     rounding: float
     size: float
 
@@ -46,7 +46,7 @@ def _crossings(values: np.ndarray, folds: np.ndarray) -> Places:
 
 
 def _approaches(theta: np.ndarray, values: np.ndarray, rates: np.ndarray,
-                near: np.ndarray) -> Places:
+                limit: np.ndarray) -> Places:
     """Return row and column of the samples after which a closure turns back close to zero."""
     sign = np.sign(values[:, :-1])
     with np.errstate(all='ignore'):
@@ -54,8 +54,8 @@ def _approaches(theta: np.ndarray, values: np.ndarray, rates: np.ndarray,
         # The tangents at two samples meet below the lowest point of a smooth curve between them.
         ahead = (sign * (values[:, 1:] - values[:, :-1]) - after * np.diff(theta)) / (
             before - after)
-        bound = sign * values[:, :-1] + before * ahead
-        return np.nonzero((before < 0.0) & (after >= 0.0) & ~(bound > near))
+        lowest = sign * values[:, :-1] + before * ahead
+        return np.nonzero((before < 0.0) & (after >= 0.0) & ~(lowest > limit))
 
 
 class Analysis:
@@ -77,9 +77,9 @@ class Analysis:
         first = self._first.normalized()
         # Where a reach may only be cut off, a dead point is found as a touch.
         ends = [end for arc in self.reach() for end in arc if not first.is_cut(end)]
-        touched = [near.value for near in self.near_zeros()
-                   if near.gap <= near.rounding
-                   and all(first.apart(near.value, end) > CLOSE for end in ends)]
+        touched = [zero.value for zero in self.near_zeros()
+                   if zero.distance <= zero.rounding
+                   and all(first.distance(zero.value, end) > CLOSE for end in ends)]
         return first.distinct([*ends, *touched])
 
     def reach(self) -> list[Arc]:
@@ -105,16 +105,16 @@ class Analysis:
         """Return the inputs at which a dyad stretches or folds, or nearly does."""
         return self._linkage.cache.get_or_make(
             ('near zeros', self._first.period, *self._others), lambda: [
-                near for arc in (self.reach() if self._linkage.structure.closures else ())
-                for near in self._near_zeros(*arc)])
+                zero for arc in (self.reach() if self._linkage.formulas.closures else ())
+                for zero in self._near_zeros(*arc)])
 
     def _near_zeros(self, lo: float, hi: float) -> Iterator[NearZero]:
         """Yield the values on an arc at which closures come near to zero."""
-        structure, curve = self._linkage.structure, self.curve('closures', ())
+        formulas, curve = self._linkage.formulas, self.curve('closures', ())
         # Those that change sign at a zero; the others end the reach there, or turn back.
-        folds = np.array([x in structure.built.folds for x in structure.closures])
+        folds = np.array([x in formulas.built.folds for x in formulas.closures])
         rounding = np.array([
-            2.0 * float(self._linkage.value(x.tolerance)) for x in structure.closures])
+            2.0 * float(self._linkage.value(x.tolerance)) for x in formulas.closures])
         theta = sampled(lo, hi)
         values, rates = np.reshape(curve(theta), (len(folds), 2, -1)).swapaxes(0, 1)
         size = np.fmax.reduce(np.abs(values), axis=1, initial=0.0)
@@ -123,15 +123,15 @@ class Analysis:
         rounding, size = np.where(
             size > FLAT * rounding, (rounding + TOLERANCE ** 2 * size, size), -1.0)
 
-        def near(row: np.ndarray, value: np.ndarray, gap: np.ndarray) -> Iterator[NearZero]:
-            return map(NearZero, *(x.tolist() for x in (value, gap, rounding[row], size[row])))
+        def near_zeros(row: np.ndarray, *zeros: np.ndarray) -> Iterator[NearZero]:
+            return map(NearZero, *(x.tolist() for x in (*zeros, rounding[row], size[row])))
 
         # A sample may be the zero itself, with a rate of either sign.
-        gaps = np.pad(np.abs(values), ((0, 0), (1, 1)), constant_values=np.inf)
-        before, inner, after = gaps[:, :-2], gaps[:, 1:-1], gaps[:, 2:]
+        distances = np.pad(np.abs(values), ((0, 0), (1, 1)), constant_values=np.inf)
+        before, inner, after = distances[:, :-2], distances[:, 1:-1], distances[:, 2:]
         row, place = np.nonzero(
             (inner <= rounding[:, None]) & (inner < before) & (inner <= after))
-        yield from near(row, theta[place], inner[row, place])
+        yield from near_zeros(row, theta[place], inner[row, place])
         searched = ((_crossings(values, folds), values),
                     (_approaches(theta, values, rates, NEAR * size[:, None]), rates))
         for kind, ((row, place), samples) in enumerate(searched):
@@ -145,5 +145,5 @@ class Analysis:
 
             zeros, _ = refined(unchanged, theta[place], theta[place + 1])
             # A fold that changes sign vanishes between two neighbouring values.
-            yield from near(row, zeros, np.abs(curve(zeros)[0::2][row, chosen]) if kind
-                            else np.zeros(len(row)))
+            yield from near_zeros(row, zeros, np.abs(curve(zeros)[0::2][row, chosen]) if kind
+                                  else np.zeros(len(row)))

@@ -16,7 +16,7 @@ from ...words import join_names, short_repr, suggestion
 # For each input of a linkage the lower and the upper end [rad or m], or None.
 Ends = Sequence[tuple[float, float] | None] | None
 # The eighth power of a length is a normal number.
-SHORTEST_LENGTH, LONGEST_LENGTH = 1e-30, 1e30
+MIN_LENGTH, MAX_LENGTH = 1e-30, 1e30
 
 
 def checked_dimensions(design: Design, values: Mapping[str, Any]) -> dict:
@@ -37,7 +37,7 @@ def checked_dimensions(design: Design, values: Mapping[str, Any]) -> dict:
 
 
 def _checked(design: Design, name: str, value: Any) -> Any:
-    if type(value) is float and SHORTEST_LENGTH <= value <= LONGEST_LENGTH:
+    if type(value) is float and MIN_LENGTH <= value <= MAX_LENGTH:
         return value
 
     def error(rule: str) -> ValueError:
@@ -54,8 +54,8 @@ def _checked(design: Design, name: str, value: Any) -> Any:
     if name not in design.signed and not np.all(length > 0.0):
         raise error('be positive')
     size = np.abs(length[length != 0.0])
-    if np.any((size < SHORTEST_LENGTH) | (size > LONGEST_LENGTH)):
-        raise error(f'lie between {SHORTEST_LENGTH:g} and {LONGEST_LENGTH:g}')
+    if np.any((size < MIN_LENGTH) | (size > MAX_LENGTH)):
+        raise error(f'lie between {MIN_LENGTH:g} and {MAX_LENGTH:g}')
     return length.copy() if length.ndim else float(length)
 
 

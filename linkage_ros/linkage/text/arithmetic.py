@@ -26,7 +26,7 @@ from ...words import short_repr
 Step = float | str
 
 # The largest number; the smallest is its inverse.
-LARGEST_NUMBER = 1e70
+MAX_NUMBER = 1e70
 IN_RANGE = '0 or between 1e-70 and 1e70'
 
 _TOKEN = re.compile(r'(?:0|[1-9][0-9]*|(?=\.[0-9]))(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?'
@@ -47,7 +47,7 @@ _EXPRESSIONS: Mapping[Step, Callable] = {
 def in_range(number: ArrayLike) -> Any:
     """Return whether a number, or each of an array, satisfies IN_RANGE."""
     size = np.abs(number)
-    return (number == 0.0) | (size >= 1.0 / LARGEST_NUMBER) & (size <= LARGEST_NUMBER)
+    return (number == 0.0) | (size >= 1.0 / MAX_NUMBER) & (size <= MAX_NUMBER)
 
 
 class Formula:

@@ -67,9 +67,9 @@ _RESERVED = (*ARITHMETIC_WORDS, 'joints', 'tracer', 'branches')
 # Reserved names of inputs: the ground, and groups of parameters.
 _RESERVED_INPUTS = 'ground', 'dimensions', 'branches'
 # Maximum number of lines, images in mirror lines included: each mirror line doubles them.
-MOST_LINES = 2000
+MAX_LINES = 2000
 # Maximum number of letters of a line, and of an error message.
-_LONGEST, _LONGEST_ERROR = 10000, 240
+_MAX_LINE, _MAX_ERROR = 10000, 240
 # A larger angle [rad] must be written with `deg` or `pi`: otherwise degrees were probably meant.
 _TURN = 6.2832
 
@@ -133,7 +133,7 @@ class Line(NamedTuple):
 
 
 def _error(line: str, problem: object) -> ValueError:
-    return ValueError(truncated(f'joint line "{truncated(line)}": {problem}', _LONGEST_ERROR))
+    return ValueError(truncated(f'joint line "{truncated(line)}": {problem}', _MAX_ERROR))
 
 
 def _hint(args: Iterable[str]) -> str:
@@ -154,8 +154,8 @@ def parse(texts: Iterable[str]) -> list[Line]:
     for text in texts:
         line = parsed(text)
         lines += _mirrored(lines, line) if line.word == 'mirrored' else [line]
-        if len(lines) > MOST_LINES:
-            raise line.error(f'a linkage has up to {MOST_LINES} lines, images included')
+        if len(lines) > MAX_LINES:
+            raise line.error(f'a linkage has up to {MAX_LINES} lines, images included')
     check_order(lines)
     return [line for line in lines if line.names]
 
@@ -206,14 +206,14 @@ def _image(word: str, arg: Argument, suffix: str) -> str:
 
 def parsed(text: str, forms: Mapping[str, tuple[str, ...]] = FORMS) -> Line:
     """Return one line; raise ValueError if it has none of the forms."""
-    if len(text) > _LONGEST:
-        raise _error(text, f'a line has up to {_LONGEST} letters, this has {len(text)}')
+    if len(text) > _MAX_LINE:
+        raise _error(text, f'a line has up to {_MAX_LINE} letters, this has {len(text)}')
     parts = text.split()
     indices = [i for i, part in enumerate(parts) if part in forms and i > 0]
     if not indices:
         for part in parts[1:]:
-            if near := did_you_mean(part, forms):
-                raise _error(text, f'unknown construction {short_repr(part)}{near}')
+            if hint := did_you_mean(part, forms):
+                raise _error(text, f'unknown construction {short_repr(part)}{hint}')
         raise _error(text, f'expected NAME and one of the constructions {", ".join(forms)}')
     at = indices[0]
     line = Line(text, tuple(parts[:at]), parts[at], tuple(parts[at + 1:]))
@@ -253,14 +253,14 @@ def _matched(form: str, args: tuple[str, ...]) -> list[Argument] | None:
                                      for kind, arg in zip(kinds, args)):
         return None
     arguments = [Argument(kind, arg) for kind, arg in zip(kinds, args) if not _is_literal(kind)]
-    left = list(args[len(kinds):])
+    rest = list(args[len(kinds):])
     for word, *kinds in map(str.split, options):
-        if left[:1] == [word] and len(left) > len(kinds):
+        if rest[:1] == [word] and len(rest) > len(kinds):
             # An option of one word is that word.
             arguments += [Argument(kind, arg, word)
-                          for kind, arg in zip(kinds or [word], left[1:] if kinds else left)]
-            del left[:1 + len(kinds)]
-    return None if left else arguments
+                          for kind, arg in zip(kinds or [word], rest[1:] if kinds else rest)]
+            del rest[:1 + len(kinds)]
+    return None if rest else arguments
 
 
 def _is_literal(kind: str) -> bool:
@@ -336,12 +336,12 @@ def check_name(name: str) -> None:
 
 def lengths(lines: Iterable[Line]) -> dict:
     """Return every dimension that the lines name, and whether it is used as a length."""
-    found: dict[str, bool] = {}
+    used: dict[str, bool] = {}
     for line in lines:
         for kind, number in line.numbers():
             for name in number.names:
-                found[name] = found.get(name, False) or (kind == 'LENGTH' and number.text == name)
-    return found
+                used[name] = used.get(name, False) or (kind == 'LENGTH' and number.text == name)
+    return used
 
 
 def draw(builder: Builder, lines: Iterable[Line], symbols: Mapping[str, Real],

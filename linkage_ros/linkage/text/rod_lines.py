@@ -74,7 +74,7 @@ FORMS = {
 INPUTS = 'motor', 'cylinder'
 _JOINTS, _RODS = ('hinge', 'slide', 'motor'), ('rod', 'cylinder')
 # Maximum number of lines of a linkage: the order of solution is searched among all rods.
-MOST_LINES = 200
+MAX_LINES = 200
 # Least sine of the angle between the axes of two hinges in a row.
 _LEANING = 1e-3
 
@@ -91,7 +91,7 @@ class WindowError(ValueError):
                  limits: dict[str, tuple[float, float]]):
         largest = ', '.join(f'{name} within {math.degrees(low):.4g}deg {math.degrees(high):.4g}deg'
                             for name, (low, high) in limits.items())
-        # Not shortened: two poses are a proof. The remedy is first, as a scene shortens the text.
+        # Not shortened: two poses are a proof. The remedy is first: scenes shorten long texts.
         super().__init__(f'{line.error("")}{problem}; ' + (
             f'the largest proved to have one at most: {largest}' if limits else
             'no limits about their middle are proved to have one at most')
@@ -142,8 +142,8 @@ def _why_not(window: Window, inputs: Sequence[str], hinges: Sequence[str]) -> tu
 def parse(texts: Iterable[str]) -> list[Line]:
     """Return the lines of a linkage; raise ValueError that names an invalid line."""
     lines = [parsed(text, FORMS) for text in texts]
-    if len(lines) > MOST_LINES:
-        raise ValueError(f'a linkage in space has up to {MOST_LINES} lines, got {len(lines)}')
+    if len(lines) > MAX_LINES:
+        raise ValueError(f'a linkage in space has up to {MAX_LINES} lines, got {len(lines)}')
     check_order(lines, 'link', (GROUND,), _RODS)
     _LinkTree(lines).order()
     return lines
@@ -196,51 +196,51 @@ class _LinkTree:
 
     def chain(self, link: str) -> list[str]:
         """Return a link and the links that carry it, down to the ground."""
-        found = [link]
-        while found[-1] != GROUND:
-            found.append(self.parents[found[-1]])
-        return found
+        chain = [link]
+        while chain[-1] != GROUND:
+            chain.append(self.parents[chain[-1]])
+        return chain
 
     def between(self, first: str, second: str) -> list[str]:
         """Return the links whose joints are between two links."""
-        one, other = self.chain(first), self.chain(second)
-        return [link for link in one if link not in other] + [
-            link for link in other if link not in one]
+        start, end = self.chain(first), self.chain(second)
+        return [link for link in start if link not in end] + [
+            link for link in end if link not in start]
 
     def order(self) -> list[Group]:
         """Return the groups in the order of solution; raise ValueError if one has no solution."""
         unknown = {name for name, line in self.lines.items()
                    if line.word in _JOINTS and name not in self.inputs}
-        left = [line for line in self.lines.values() if line.word in _RODS]
+        unsolved = [line for line in self.lines.values() if line.word in _RODS]
         groups: list[Group] = []
-        while left:
+        while unsolved:
             open_ = [(line, tuple(x for x in self.between(*line.depends_on) if x in unknown))
-                     for line in left]
+                     for line in unsolved]
             rods, links = self._next(open_)
             groups.append((rods, links))
             unknown -= {*links}
-            left = [line for line in left if line not in rods]
+            unsolved = [line for line in unsolved if line not in rods]
         for name in unknown:
             raise self.lines[name].error(f'no rod places {name}')
         return groups
 
-    def _next(self, left: list[tuple[Line, tuple[str, ...]]]) -> Group:
+    def _next(self, unsolved: list[tuple[Line, tuple[str, ...]]]) -> Group:
         """Return the next group of rods, each given with the unplaced joints between its ends."""
-        free = [line for line, _ in left
+        free = [line for line, _ in unsolved
                 if line.word == 'cylinder' and line.names[0] not in self.inputs]
-        for line, links in left:
+        for line, links in unsolved:
             if not links and line not in free:
                 raise line.error('all joints between its ends are placed already: one rod too '
                                  'many, or one hinge too few')
             if len(links) == (line not in free):
                 return (line,), links
-        for (one, links), (other, same) in combinations(left, 2):
-            if links == same and len(links) == 2 and not {one, other} & set(free) \
+        for (first, links), (second, between) in combinations(unsolved, 2):
+            if links == between and len(links) == 2 and not {first, second} & set(free) \
                     and self._in_a_row(links):
-                return (one, other), links[::-1]
-        line, links = min(left, key=lambda each: len(each[1]))
-        others = [other.names[0] for other, also in left
-                  if other is not line and set(also) & set(links)]
+                return (first, second), links[::-1]
+        line, links = min(unsolved, key=lambda rod: len(rod[1]))
+        others = [second.names[0] for second, also in unsolved
+                  if second is not line and set(also) & set(links)]
         raise line.error(
             f'{join_names(links)} between its ends are unplaced'
             f'{f", as for {join_names(others)}" if others else ""}: one rod places one hinge or '
@@ -305,7 +305,7 @@ class _Drawing:
             self._check_joint(joint)
         for name, line in self._tree.lines.items():
             if line.word == 'rod':
-                self._lengths[name] = [*self._numbers[name][6:], self._apart(line)][0]
+                self._lengths[name] = [*self._numbers[name][6:], self._distance(line)][0]
         for name in self._tree.inputs:
             self._drive(name)
         for rods, links in self._tree.order():
@@ -315,7 +315,7 @@ class _Drawing:
                 self._place_joint(rods[0], self._joints[links[0]])
             else:
                 (name,) = rods[0].names
-                self._lengths[name] = self._within(name, self._apart(rods[0]))
+                self._lengths[name] = self._within(name, self._distance(rods[0]))
         for name, line in self._tree.lines.items():
             (self._add_rod if line.word in _RODS else self._add_joint)(name, line)
 
@@ -336,10 +336,10 @@ class _Drawing:
         """Make an angle or a length an input."""
         self._builder.drawn = self._tree.lines[name]
         joint, ends = self._joints.get(name), self._numbers[name][6:]
-        turns, longest = joint and joint.line.word != 'slide', 2.0 * self._magnitude
-        value = self._within(name, self._builder.drive(Input(name, ANGLE) if turns else Input(
-            name, LENGTH, *(ends or (-longest if joint else real(0.0), longest))), None))
-        if joint and turns:
+        is_angle, farthest = joint and joint.line.word != 'slide', 2.0 * self._magnitude
+        value = self._within(name, self._builder.drive(Input(name, ANGLE) if is_angle else Input(
+            name, LENGTH, *(ends or (-farthest if joint else real(0.0), farthest))), None))
+        if joint and is_angle:
             joint.turn = Turn.by(value)
         elif joint:
             joint.shift = value
@@ -351,7 +351,7 @@ class _Drawing:
         numbers = self._numbers[line.names[0]]
         return _End(first, Vector(*numbers[:3])), _End(second, Vector(*numbers[3:6]))
 
-    def _apart(self, line: Line) -> Real:
+    def _distance(self, line: Line) -> Real:
         """Return the length between a rod's ends; joints that are not placed are as drawn."""
         first, second = self._ends(line)
         return self._on_link(second, first.link).minus(first.point).length()
@@ -417,10 +417,10 @@ class _Drawing:
         word, ends = self._tree.lines[name].word, self._numbers[name][6:]
         slack = real(EDGE) if word == 'hinge' else TOLERANCE * self._magnitude
         margins = [value - ends[0], ends[1] - value] if ends else [value] * (word == 'cylinder')
-        found = [Limit(margin, slack) for margin in margins]
-        self._builder.limits += found
-        self._builder.ways += found
-        return found
+        limits = [Limit(margin, slack) for margin in margins]
+        self._builder.limits += limits
+        self._builder.ways += limits
+        return limits
 
     def _within(self, name: str, value: Real) -> Real:
         """Return the value of a joint or a cylinder, NaN beyond its limits."""
