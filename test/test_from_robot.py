@@ -353,8 +353,7 @@ OPEN = {
     'a foot in two poses': ('foot.urdf', {}, 'pitch=-2.77 as with pitch=2.38'),
     'a foot in one': ('foot.urdf', {'pitch': 2.0}, ''),
     'legs in two poses each': (legs(2), {}, 'as with'),
-    'a motor that moves': ('boom.urdf', {'boom_cylinder': 5.0}, ''),
-    'a motor that moves in space': ('cylinder.xml', {'ram': 3.0}, ''),
+    'a motor that moves': ('cylinder.xml', {'ram': 3.0}, ''),
     'bars in line': ('folded.urdf', {'elbow': 0.2, 'shoulder': 0.1}, 'as with')}
 
 
@@ -454,7 +453,7 @@ def test_the_table_of_messages_has_all_refusals_and_no_others():
     trees = [ast.parse(path.read_text()) for path in (
         *package.glob('robot_*/*.py'), package / 'linkage' / 'dyads.py')]
     said = [each for tree in trees for each in refusals(tree)]
-    assert len(said) > 45 and len(quotes) > 30
+    assert len(said) > 45
     assert not [each for each in said if not any(quote in each for quote in quotes)]
     assert not [quote for quote in quotes if not any(quote in quoted(tree) for tree in trees)]
 
