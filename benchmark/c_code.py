@@ -33,14 +33,14 @@ POSES = 16
 SIDE = ' '.join(f'side.{what}[{{i}}] = {value};' for what, value in (
     ('position', '{from}[k][{i}]'), ('velocity', '1.0f'), ('effort', '0.0f')))
 USES = {
-    'pose': '{name}_pose p; {name}_solve({given}, &p); out = p.{field};',
+    'pose': '{name}_pose p; {name}_solve({given}, 0, &p, NULL); out = p.{field};',
     # Next to the other end of the reach, so that each assembly mode is chosen somewhere.
     'inverse': '{number} x[2] = {{ given[{last} - k][0], given[{last} - k][{other}] }}; '
                '{inverse} out = x[0];',
-    'actuators to joints': '{measured} {name}_actuators_to_joints(&memory, &side, &to); '
-                           'out = to.effort[0];',
-    'joints to actuators': '{commanded} {name}_joints_to_actuators(&memory, &side, &to); '
-                           'out = to.effort[0];'}
+    'actuators to joints': '{measured} lkr_actuators_to_joints(&{name}_model, &memory, '
+                           '&side, &to); out = to.effort[0];',
+    'joints to actuators': '{commanded} lkr_joints_to_actuators(&{name}_model, &memory, '
+                           '&side, &to); out = to.effort[0];'}
 MAIN = """
 static const float given[][{n}] = {{ {given_rows} }}, found[][{n}] = {{ {found_rows} }};
 static lkr_memory memory;
@@ -63,12 +63,12 @@ volatile int from;
 int main(void)
 {{
     begin();
-    {name}_begin(&memory);
+    lkr_begin(&{name}_model, &memory);
     for (int k = from; k < {count}; k++) {{
         unsigned long best = -1ul, idle = -1ul;
         for (int i = 0; i < TRIES; i++) {{
             {before}
-            {name}_actuators_to_joints(&memory, &side, &to);
+            lkr_actuators_to_joints(&{name}_model, &memory, &side, &to);
             unsigned long start = now();
             // What follows is not computed before.
             __asm__ volatile ("" ::: "memory");
@@ -170,7 +170,7 @@ def main():
 def measured(target, text, values):
     """Return flash, that of the C library, RAM, the stack of the linkage's code, and times."""
     body = values['body']
-    begin = '{name}_begin(&memory);'.format(**values) if 'memory' in body else ''
+    begin = 'lkr_begin(&{name}_model, &memory);'.format(**values) if 'memory' in body else ''
     sizes = [built(target, ['--specs=nosys.specs'] * ('arm' in target.compiler) + [*extra],
                    text + MAIN.format(**{**values, 'body': each}, begin=each and begin))
              for extra in ((), ('-c',)) for each in ('', body)]
@@ -194,8 +194,7 @@ def prepared(name, outputs, number, use):
     found = np.stack([values[output] for output in outputs])
     joints = [f'{name}_{output}' for output in outputs]
     fields = [field(linkage, output) for output in outputs]
-    inverse = (f'{name}_inputs_for_{"_".join(fields)}(found[k], x, x);' if n > 1 else
-               f'{name}_crank_for_{fields[0]}(found[k][0], x[0], x);')
+    inverse = f'lkr_inverse(&{name}_for_{"_".join(fields)}, found[k], x, x);'
     named = {'name': name, 'n': n, 'count': POSES, 'number': number, 'last': POSES - 1,
              'other': n - 1, 'inverse': inverse, 'field': fields[0],
              'given': ', '.join(f'given[k][{i}]' for i in range(n)),

@@ -12,7 +12,6 @@ from pathlib import Path
 import re
 import shutil
 import subprocess
-import sys
 
 from linkage_ros.c_code import header
 from linkage_ros.c_code.axes import joints
@@ -23,16 +22,11 @@ import pytest
 # What nothing writes.
 UNWRITTEN = 0.123456789
 STAND_IN = Path(__file__).parent / 'ros2_control'
-# What finds rcutils, whose log transmissions use; nothing if it is not installed.
-ROS = next(([f'-isystem{include}', f'-L{prefix}/lib', '-lrcutils', f'-Wl,-rpath,{prefix}/lib']
-            for prefix in (sys.prefix, *os.environ.get('AMENT_PREFIX_PATH', '').split(':'))
-            for include in (f'{prefix}/include/rcutils', f'{prefix}/include')
-            if Path(include, 'rcutils', 'logging_macros.h').is_file()), [])
 COMPILER = shutil.which('cc') or shutil.which('gcc')
 SANITIZED = ('-g', '-O0', '-fsanitize=address,undefined', '-fno-sanitize-recover=all')
 STRICT = ('-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wshadow', '-Werror')
 # For what is written for ros2_control.
-PLUGIN = ('-std=c++17', *STRICT, '-isystem', STAND_IN / 'include', *ROS)
+PLUGIN = ('-std=c++17', *STRICT, '-isystem', STAND_IN / 'include')
 
 
 @contextmanager
@@ -55,14 +49,14 @@ def loaded(folder, code, *flags):
     if not library.exists() or source.read_text() != code:
         source.write_text(code)
         subprocess.run([
-            COMPILER, '-std=c99', '-DLKR_MAX_INPUTS=3', '-DLKR_MAX_SOLUTIONS=1024', *STRICT,
-            *flags, '-shared', '-fPIC', source, '-o', library, '-lm'], check=True)
+            COMPILER, '-std=c99', *STRICT, *flags, '-shared', '-fPIC', source, '-o', library,
+            '-lm'], check=True)
     return ctypes.CDLL(str(library))
 
 
 def counted(text):
     """Return C with a function `poses_taken`, which returns how many poses there were since."""
-    counting = re.sub(r'(int \w+_at\w*\([^;]*?\)\n{\n)', r'\1    taken++;\n', text)
+    counting = re.sub(r'(int \w+_at\([^;]*?\)\n{\n)', r'\1    taken++;\n', text)
     assert 'taken++' in counting
     return f"""static int taken;
 {counting}
@@ -77,20 +71,19 @@ def inverters(folder, asked):
     `asked` has a mechanism and outputs for each. They check that no more poses are computed than
     the header says.
     """
-    texts, callers, called = [], [], []
-    for mechanism, outputs in asked:
-        texts.append(header.written(mechanism, outputs))
-        name, = re.findall(r'int (\w+_for_\w+)', texts[-1])
-        given = 'value, near' if len(outputs) > 1 else '*value, *near'
-        called.append((mechanism.name, len(outputs), int(re.search(
-            r'call takes at most (\d+) poses', texts[-1])[1])))
-        callers.append(f"""
+    callers, called = '', []
+    text = header.printed([header.Request(mechanism, outputs) for mechanism, outputs in asked])
+    bounds = re.findall(r'call takes at most (\d+) poses', text)
+    models = re.findall(r'lkr_model (\w+_for_\w+) =', text)
+    for (mechanism, outputs), model, most in zip(asked, models, bounds, strict=True):
+        called.append((mechanism.name, len(outputs), int(most)))
+        callers += f"""
 int {mechanism.name}_inverted(const double *value, const double *near, double *inputs)
 {{
-    return {name}({given}, inputs);
+    return lkr_inverse(&{model}, value, near, inputs);
 }}
-""")
-    library = loaded(folder, counted(''.join(texts)) + ''.join(callers))
+"""
+    library = loaded(folder, counted(text) + callers)
 
     def invert(name, n, most, value, near):
         made = (ctypes.c_double * n)(*[UNWRITTEN] * n)
@@ -147,8 +140,8 @@ def prove(package, mechanism, compiler, flags=PLUGIN):
             pytest.skip(f'the sanitizers of {compiler} are not installed')
         subprocess.run([
             compiler, *flags, '-O2', *more, f'-DNAME={name}', f'-DNAMESPACE={space}',
-            f'-DINPUTS={len(arcs)}', f'-DRANGES={{{ranges}}}', '-I', package / 'src', '-I',
-            package / 'include', STAND_IN / 'proof.cpp', '-o', program, *flags], check=True)
+            f'-DINPUTS={len(arcs)}', f'-DRANGES={{{ranges}}}', '-I', package / 'src',
+            STAND_IN / 'proof.cpp', '-o', program, *flags], check=True)
         ended = subprocess.run([program, str(count)], capture_output=True, text=True)
         assert ended.returncode == 0, ended.stdout + ended.stderr
         tried, good = map(int, re.search(r'(\d+) states, (\d+)', ended.stdout).groups())

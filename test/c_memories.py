@@ -11,19 +11,20 @@ import numpy as np
 
 # All that is given and written is an lkr_side: positions, velocities, efforts.
 CALLER = """
-static {name}_memory {name}_m;
-void {name}_started(void) {{ {name}_begin(&{name}_m); }}
+static lkr_memory {name}_m;
+void {name}_started(void) {{ lkr_begin(&{name}_model, &{name}_m); }}
 int {name}_sent(int side, const lkr_side *from, lkr_side *to)
 {{
-    return side ? {name}_joints_to_actuators(&{name}_m, from, to)
-        : {name}_actuators_to_joints(&{name}_m, from, to);
+    return (side ? lkr_joints_to_actuators : lkr_actuators_to_joints)(
+        &{name}_model, &{name}_m, from, to);
 }}
 """
 
 
 def memories(requests, single=False):
     """Return the C of mechanisms, with the functions that `Memory` calls."""
-    return header.printed(requests, single) + ''.join(CALLER.format(
+    row = 'int row_size(void) { return LKR_MAX_JOINTS; }\n'
+    return header.printed(requests, single) + row + ''.join(CALLER.format(
         name=request.mechanism.name) for request in requests)
 
 
@@ -37,13 +38,14 @@ class Memory:
     """The memory of one mechanism in C."""
 
     def __init__(self, library, mechanism, kind=float):
-        self._send, self._n, self._kind = (
-            library[f'{mechanism.name}_sent'], len(mechanism.inputs), kind)
+        self._send, self._n, self._shape, self._kind = (
+            library[f'{mechanism.name}_sent'], len(mechanism.inputs), (3, library.row_size()),
+            kind)
         library[f'{mechanism.name}_started']()
 
     def send(self, side, position, velocity=0.0, effort=0.0):
         """Return the status and the other side's positions, velocities, efforts: or UNWRITTEN."""
-        given, found = np.zeros((3, 3), self._kind), np.full((3, 3), UNWRITTEN, self._kind)
+        given, found = (np.full(self._shape, each, self._kind) for each in (0.0, UNWRITTEN))
         for row, values in zip(given, (position, velocity, effort)):
             row[:self._n] = values
         status = self._send(side, *(ctypes.c_void_p(x.ctypes.data) for x in (given, found)))

@@ -166,7 +166,7 @@ def test_a_flap_is_put_where_a_planner_wants_it(reader):
 @pytest.mark.nightly
 def test_an_ankle_on_two_rods(graph, reader):
     states = graph.listen(JointState, 'joint_states', 100)
-    assert 'ankle_joints_to_actuators' in reader.follow('rods')
+    assert 'lkr_model ankle_model' in reader.follow('rods')
     graph.until(lambda: {name for state in states for name in state.name} >= {
         'ankle_pitch', 'ankle_roll', 'motor_left', 'motor_right'})
 

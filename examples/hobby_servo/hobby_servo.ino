@@ -23,7 +23,7 @@ void setup() {
 void loop() {
   float target = SWING * sin(2.0 * PI * millis() / (1000.0 * PERIOD));
   // The solution nearest to the present crank angle; without one, the servo stays.
-  if (lever_crank_for_angle_lever(target, crank, &crank)) {
+  if (lkr_inverse(&lever_for_angle_lever, &target, &crank, &crank)) {
     servo.writeMicroseconds(map(1000.0 * (MIDDLE + crank * RAD_TO_DEG), 0, 180000, 544, 2400));
   }
   delay(20);

@@ -106,20 +106,16 @@ class Code:
         # How constants follow from lengths, as text where that is short.
         formulas: dict[Real, str] = {}
         for x in pose.variant.steps:
-            parts, text = [formulas[y] for y in x.operands], str(x.args[0])
-            if x.op == 'where':
-                text = parts[1 if exact[x.args[0]] else 2]
-            elif parts:
-                text = OPERATIONS[x.op].python.format(*parts)
-            formulas[x] = text if all(parts) and len(text) <= MAX_FORMULA else ''
-        abouts = {name: f' /* {comment(bare(formulas[node]))} */' for name, node in zip(
-            constants, pose.variant.constants) if '(' in formulas[node]}
+            parts = [formulas[y] for y in x.operands]
+            formula = OPERATIONS[x.op].python.format(*parts) if parts else str(x.args[0])
+            formulas[x] = formula if all(parts) and len(formula) <= MAX_FORMULA else ''
         # Lengths have names and come first; coordinates of points on links are dimensions, too.
-        names = {name: f'length_{node.args[0]}' for name, node in zip(
-            constants, pose.variant.constants)
-            if node.op == 'dimension' and node.args[0].isidentifier()}
-        declared = {names.get(name, name): self.literal(value) + ';' + abouts.get(name, '')
-                    for name, value in constants.items()}
+        names, declared = {}, {}
+        for (name, value), node in zip(constants.items(), pose.variant.constants):
+            if node.op == 'dimension' and node.args[0].isidentifier():
+                names[name] = f'length_{node.args[0]}'
+            about = f' /* {comment(bare(formulas[node]))} */' * ('(' in formulas[node])
+            declared[names.get(name, name)] = f'{self.literal(value)};{about}'
         text = _NAMED.sub(lambda name: names.get(name[0], name[0]), '\n'.join([*body, last]))
         used = {*_NAMED.findall(text)}
         lines = [f'const {self.number} {name} = {declared[name]}'

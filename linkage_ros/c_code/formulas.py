@@ -10,7 +10,7 @@ from typing import Iterable, Iterator, Mapping, Sequence
 
 from .code import Code
 from .names import comment, distinct, field
-from ..formula.expression import Real, real
+from ..formula.expression import argument, Real, real
 from ..scene import SceneMechanism
 
 
@@ -29,67 +29,52 @@ class Formulas:
 
     Attributes
     ----------
-    by : list of str
-        The names of the rates by the inputs.
     fields : dict
         The fields of a pose, by output.
-    names : dict
-        Names of the mechanism, its inputs and their rates, for templates.
 
     """
 
     def __init__(self, mechanism: SceneMechanism, code: Code, outputs: Sequence[str]):
         self._mechanism, self._code = mechanism, code
         self._linkage = linkage = mechanism.linkage
-        self.by = [f'by_{name}' for name in mechanism.inputs]
-        # No word of C and no macro ends so.
-        self._parameters = [f'{name}_' for name in mechanism.inputs]
-        self.names = {
-            'name': mechanism.name, 'number': code.number, 'by': ', '.join(self.by),
-            'by_zero': ', '.join(f'{by} = LKR_ZERO' for by in self.by),
-            'by_places': ', '.join(f'&{by}' for by in self.by),
-            'by_pointers': ', '.join(f'{mechanism.name}_pose *{by}' for by in self.by),
-            'arguments': ', '.join(self._parameters),
-            'parameters': ', '.join(f'{code.number} {name}' for name in self._parameters),
-            'inputs_named': ' and by '.join(mechanism.inputs),
-            'elements': ', '.join(f'q[{i}]' for i in range(len(self.by)))}
         # Points in space are of no use on a board.
-        self._points = () if mechanism.in_space else linkage.points
+        points = () if mechanism.in_space else linkage.points
         named = dict.fromkeys((
-            *(f'{point}.{axis}' for point in self._points for axis in 'xy'), *linkage.joints,
-            *outputs))
+            *(f'{point}.{axis}' for point in points for axis in 'xy'), *linkage.joints, *outputs))
         self.fields = dict(zip(named, distinct(field(linkage, output) for output in named)))
 
     def struct(self) -> str:
         """Return the fields of a pose."""
-        parents = {link.name: link.parent for link in self._linkage.links}
-        rows = [(f'{point}_x, {point}_y', '[m]') for point in self._points]
-        for output, name in [*self.fields.items()][2 * len(self._points):]:
-            is_angle = self._linkage.is_angle(output)
-            to = f'to {parents[output]} ' if is_angle and output in parents else ''
-            rows.append((name, to + ('[rad]' if is_angle else '[m]')))
-        return '\n'.join(f'    {self._code.number} {names};'.ljust(34) + f'/* {about} */'
-                         for names, about in rows)
+        linkage, rows = self._linkage, []
+        parents = {link.name: f'to {link.parent} ' for link in linkage.links}
+        for output, name in self.fields.items():
+            unit = parents.get(output, '') + '[rad]' if linkage.is_angle(output) else '[m]'
+            rows.append(f'    {self._code.number} {name};'.ljust(34) + f'/* {unit} */')
+        return '\n'.join(rows)
 
     def function(self) -> str:
         """Return the function for all fields and their rates."""
         structure, groups = self._linkage.formulas, [*self._groups()]
-        by = dict(zip(self.by, self._mechanism.scales))
+        name, scales, number = self._mechanism.name, self._mechanism.scales, self._code.number
+        # No word of C and no macro ends so.
+        inputs = [f'{name}_' for name in self._mechanism.inputs]
         poses = [(f'/* {comment(about)} */', self._assigned(
-            outputs, {'p': 1.0}, map(structure.output, outputs))) for about, outputs in groups]
+            outputs, {'p->': 1.0}, map(structure.output, outputs))) for about, outputs in groups]
         rates = [(f'/* Rates of {comment(about)} */', self._assigned(
-            outputs, by, structure.parts(((), (), tuple(outputs))))) for about, outputs in groups]
-        valid = real(0.0)
+            outputs, {f'by[{i}].': scale for i, scale in enumerate(scales)},
+            structure.parts(((), (), tuple(outputs))))) for about, outputs in groups]
+        # An input without a value has no pose.
+        valid = sum(map(argument, range(len(inputs))), real(0.0))
         # If it can be assembled at any input, rounding does not matter.
-        if len(self.by) > 1 or not self._linkage.inputs[0].is_whole(self._linkage.reach()):
+        if len(inputs) > 1 or not self._linkage.inputs[0].is_whole(self._linkage.reach()):
             valid = structure.where_assembled(valid)
+        parameters = ', '.join(f'{number} {each}' for each in inputs)
         return self._code.function(
-            '/* The pose; with has_rates, rates by {inputs_named}. Returns 0 beyond a limit. */\n'
-            'LKR_FORMULA int {name}_formulas({parameters}, int has_rates, {name}_pose *p,\n'
-            '    {by_pointers})'.format(**self.names),
-            [self._code.times(parameter, 1.0 / scale)
-             for parameter, scale in zip(self._parameters, self._mechanism.scales)],
-            [*poses, ('', {f'const {self._code.number} valid': valid}),
+            '/* The pose and, with has_rates, its rates by each input; returns 0 if there is none.'
+            f' */\nLKR_FORMULA int {name}_solve({parameters}, int has_rates,\n'
+            f'    {name}_pose *p, {name}_pose *by)',
+            [self._code.times(each, 1.0 / scale) for each, scale in zip(inputs, scales)],
+            [*poses, ('', {f'const {number} valid': valid}),
              ('if (!has_rates) {\n    return isfinite(valid);\n}', {}), *rates],
             'return isfinite(valid);')
 
@@ -115,6 +100,6 @@ class Formulas:
                   values: Iterable[Real]) -> dict[str, Real]:
         """Return values of outputs in structs, each by a unit, by their places in C."""
         scale_of = self._mechanism.scale_of
-        return {f'{struct}->{self.fields[output]}': value * (scale_of(output) / unit)
+        return {f'{struct}{self.fields[output]}': value * (scale_of(output) / unit)
                 for ((struct, unit), output), value in zip(
                     product(structs.items(), outputs), values)}

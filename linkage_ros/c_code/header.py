@@ -10,13 +10,12 @@ library's sine, cosine and arctangent. What all mechanisms have in common is `li
 
 from __future__ import annotations
 
-import re
 from typing import Any, Iterator, NamedTuple, Sequence
 
 from .axes import actuators, Axis, axis, invertible, joints, loads
-from .code import Code, indented
+from .code import Code
 from .formulas import Formulas
-from .names import comment, distinct, field, filled, prefix, template
+from .names import distinct, field, filled, template
 from .tables import Tables
 from ..linkage import Mechanism
 from ..scene import SceneMechanism
@@ -73,8 +72,8 @@ def printed(requests: Sequence[Request], single: bool = False) -> str:
 def headers(requests: Sequence[Request], single: bool, common: Sequence[str]) -> list[str]:
     """Return the headers of mechanisms in one program, each with a text of `common`."""
     values = [_values(request, single) for request in requests]
-    sizes = {size: max(each[f'own_{size}'] for each in values) for size in (
-        'inputs', 'solutions')}
+    sizes = {size: max(each[f'own_{size}'] for each in values)
+             for size in ('inputs', 'joints', 'solutions')}
     return [filled(template('mechanism.h.in'), {**each, **sizes, 'common': text})
             for each, text in zip(values, common)]
 
@@ -89,27 +88,24 @@ def _values(request: Request, single: bool) -> dict[str, Any]:
         *(each.output for axes in (*sides, *inverses.values()) for each in axes),
         *(output for output, _ in loads(mechanism))])
     tables = Tables(mechanism, code, formulas)
-    parts = [tables.text(sides, '', request.passive)]
-    for tag, axes in inverses.items():
-        parts += [tables.text(([], axes), tag), _inverse(mechanism, axes, tag, code.number)]
+    what, where = (_with_units(linkage, axes) for axes in sides)
+    parts = [tables.text(f'{name}_model', f'Actuators: {what}; joints: {where}', sides,
+                         request.passive)]
+    parts += [tables.text(f'{name}_for_{tag}', f'{join_names(mechanism.inputs)} for '
+                          f'{_with_units(linkage, axes)}', ([], axes))
+              for tag, axes in inverses.items()]
     _, counts, functions = zip(*tables.solutions.values())
     about = [*_about(mechanism), f'A call takes at most {POSES * max(counts) + 1} poses.']
-    whole = ' + '.join(f'p->{member}' for member in formulas.fields.values())
     return {
-        'about': '\n'.join(f' * {line}' for line in about),
-        **formulas.names, 'N': prefix(name), 'float': int(single),
-        'own_inputs': len(linkage.inputs), 'own_solutions': max(counts),
+        'about': '\n'.join(f' * {line}' for line in about), 'name': name, 'float': int(single),
+        'number': code.number, 'suffix': '##f' * single, 'own_inputs': len(linkage.inputs),
+        'own_joints': len(sides[1]) + len(request.passive), 'own_solutions': max(counts),
         'fields': formulas.struct(), 'pose': formulas.function(),
-        'whole': indented([f'return isfinite({whole});']),
-        'enums': '\n'.join(_enum(f'{prefix(name)}_{side}', axes) for side, axes in zip(
-            ('ACTUATOR', 'JOINT'), sides)),
-        'axes': comment('; '.join(f'{side}: {_with_units(linkage, axes)}' for side, axes in zip(
-            ('Actuators', 'joints'), sides))),
         'model': '\n'.join([*functions, *parts])}
 
 
 def _inverses(mechanism: SceneMechanism, texts: Sequence[str]) -> dict[str, list[Axis]]:
-    """Return the axes of each inverse, by the end of its names."""
+    """Return the axes of each inverse, by the end of its name."""
     outputs, n = [*map(plain_text, texts)], len(mechanism.inputs)
     for output in outputs:
         mechanism.linkage.check_output(output)
@@ -119,23 +115,8 @@ def _inverses(mechanism: SceneMechanism, texts: Sequence[str]) -> dict[str, list
     groups = [invertible(mechanism, [axis(mechanism, output, output)
                                      for output in outputs[i:i + n]])
               for i in range(0, len(outputs), n)]
-    return dict(zip(distinct('_'.join(['', *(field(mechanism.linkage, each.output)
-                                             for each in axes)]) for axes in groups), groups))
-
-
-def _inverse(mechanism: SceneMechanism, axes: Sequence[Axis], tag: str, number: str) -> str:
-    """Return the users' inverse: from outputs and near inputs, in scene units, to inputs."""
-    n, (what, *_), name = len(axes), mechanism.inputs, mechanism.name
-    parameters = f'{number} value, {number} near, {number} *{what}_'
-    arguments = f'&value, &near, 0, {what}_'
-    if n > 1:
-        what, arguments = 'inputs', 'value, near, 0, inputs'
-        parameters = f'const {number} value[{n}], const {number} near[{n}], {number} inputs[{n}]'
-    return (f'/* The {what} for {_with_units(mechanism.linkage, axes)}, nearest to `near`, whole '
-            f'turns included.\n   Returns 0, and leaves {what} alone, where there is none. */\n'
-            f'static inline int {name}_{what}_for{tag}({parameters})\n{{\n'
-            f'    lkr_point p;\n'
-            f'    return lkr_inverse(&{name}_model{tag}, LKR_JOINTS, {arguments}, &p);\n}}\n')
+    return dict(zip(distinct('_'.join(field(mechanism.linkage, each.output) for each in axes)
+                             for axes in groups), groups))
 
 
 def _about(mechanism: SceneMechanism) -> Iterator[str]:
@@ -149,13 +130,6 @@ def _about(mechanism: SceneMechanism) -> Iterator[str]:
     if len(linkage.inputs) == 1 and not linkage.inputs[0].is_part:
         arcs = ' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in mechanism.first.reach)
         yield f'It can be assembled in {arcs} {linkage.inputs[0].unit}.'
-
-
-def _enum(start: str, axes: Sequence[Axis]) -> str:
-    """Return the constants of axes, whose names may have any characters."""
-    ends = distinct(re.sub(r'[^A-Z0-9]+', '_', each.name.upper()).strip('_') or 'UNNAMED'
-                    for each in axes)
-    return f'enum {{ {", ".join(f"{start}_{end} = {i}" for i, end in enumerate(ends))} }};'
 
 
 def _with_units(linkage: Mechanism, axes: Sequence[Axis]) -> str:

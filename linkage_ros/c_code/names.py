@@ -38,11 +38,6 @@ def distinct(names: Iterable[str]) -> list[str]:
     return [*made]
 
 
-def prefix(name: str) -> str:
-    """Return the prefix of a mechanism's constants: different for arm, Arm and ARM."""
-    return name.upper() if name.islower() else f'{name}_' if name.isupper() else name
-
-
 def field(linkage: Mechanism, output: str) -> str:
     """Return the name of an output in C."""
     plain = re.sub(r'\W+', '_', output).strip('_')

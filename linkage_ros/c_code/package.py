@@ -10,11 +10,8 @@ from xml.sax.saxutils import escape, quoteattr
 
 from . import header
 from .axes import actuators, Axis, joints, passive
-from .names import comment, distinct, filled, literal, template
+from .names import comment, filled, literal, template
 from ..scene import SceneMechanism
-
-# Names of packages.
-PACKAGE = re.compile(r'(?=.{2,64}$)[a-z](_?[a-z0-9])*', re.ASCII)
 
 
 def package(name: str, scene: str, mechanisms: Sequence[tuple[SceneMechanism, Sequence[str]]]
@@ -34,21 +31,20 @@ def package(name: str, scene: str, mechanisms: Sequence[tuple[SceneMechanism, Se
     Raises
     ------
     ValueError
-        If a joint does not exist, or joints do not determine all inputs.
+        If the name is none of a package, a joint does not exist, or joints do not determine all
+        inputs.
 
     """
-    types = distinct(
-        re.sub(r'(?<=[a-z])(?=[A-Z])', '_', mechanism.name).title().replace('_', '')
-        for mechanism, _ in mechanisms)
+    if not re.fullmatch('(?=.{2,64}$)[a-z](_?[a-z0-9])*', name, re.ASCII):
+        raise ValueError("--out must end in the package's name: 2 to 64 lower-case letters, "
+                         f'digits and single underscores, a letter first, not {name!r}')
     parts, requests = [], []
-    for type_, (mechanism, chosen) in zip(types, mechanisms):
+    for mechanism, chosen in mechanisms:
         commanded = joints(mechanism, chosen)
-        others = passive(mechanism, commanded)
-        requests.append(header.Request(mechanism, (), chosen, others))
-        parts.append(_parts(name, type_, mechanism, commanded, others))
+        requests.append(header.Request(mechanism, (), chosen, passive(mechanism, commanded)))
+        parts.append(_parts(name, requests[-1], commanded))
     values = {
         'package': name, 'namespace': f'{name}_plugins', 'scene': escape(comment(scene)),
-        'passive': max(len(request.passive) for request in requests),
         **{key: '\n'.join(part[key] for part in parts) for key in parts[0]}}
     headers = header.headers(requests, False, ['#include "linkage.h"'] * len(requests))
     return {
@@ -56,34 +52,30 @@ def package(name: str, scene: str, mechanisms: Sequence[tuple[SceneMechanism, Se
            for request, text in zip(requests, headers)},
         Path('src/linkage.h'): template('linkage.h'),
         **{path: filled(template(path.name), values) for path in map(Path, (
-            'CMakeLists.txt', 'package.xml', 'README.md', 'plugins.xml', 'src/plugins.cpp',
-            'src/transmission.hpp', 'urdf/transmissions.xml',
-            'include/linkage_ros/linkage_transmission.hpp'))}}
+            'CMakeLists.txt', 'package.xml', 'plugins.xml', 'src/plugins.cpp',
+            'urdf/transmissions.xml'))}}
 
 
-def _parts(package_name: str, type_: str, mechanism: SceneMechanism, commanded: Sequence[Axis],
-           others: Sequence[Axis]) -> Mapping[str, str]:
+def _parts(package_name: str, request: header.Request, commanded: Sequence[Axis]
+           ) -> Mapping[str, str]:
     """Return what a mechanism adds to the files that all have in common."""
     def rows(axes: Sequence[Axis]) -> str:
         return ', '.join(f'{{{literal(axis.name)}, {literal(axis.role)}}}' for axis in axes)
 
+    mechanism = request.mechanism
     sides, name = (actuators(mechanism), commanded), mechanism.name
-    first, second = (escape(comment(', '.join(axis.name for axis in axes))) for axes in sides)
-    plugin, loader = f'{package_name}/{type_}', f'{package_name}_plugins::{type_}Loader'
+    plugin, loader = f'{package_name}/{name}', f'{package_name}_plugins::{name}_loader'
     described = [f'  <{kind} name={quoteattr(axis.name)} role={quoteattr(axis.role)}/>'
                  for kind, axes in zip(('actuator', 'joint'), sides) for axis in axes]
     return {
-        'rows': f'| `{plugin}` | {first} | {second} |',
         'includes': f'#include "{name}_linkage.h"',
         'linkages': f'const Linkage {name}_linkage{{{name}_model, {{{rows(sides[0])}}}, '
-                    f'{{{rows([*commanded, *others])}}}}};\n'
-                    f'using {type_}Loader = LoaderOf<{name}_linkage>;',
+                    f'{{{rows([*commanded, *request.passive])}}}}};\n'
+                    f'using {name}_loader = LoaderOf<{name}_linkage>;',
         'exports': 'PLUGINLIB_EXPORT_CLASS(\n'
                    f'  {loader}, transmission_interface::TransmissionLoader)',
         'classes': f'  <class name="{plugin}" type="{loader}"\n'
-                   '         base_class_type="transmission_interface::TransmissionLoader">\n'
-                   f'    <description>The linkage {name} between {first} and {second}.'
-                   '</description>\n  </class>',
+                   '         base_class_type="transmission_interface::TransmissionLoader"/>',
         'transmissions': '\n'.join([
             f'<transmission name="{name}">', f'  <plugin>{plugin}</plugin>', *described,
             '</transmission>'])}

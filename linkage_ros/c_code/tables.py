@@ -52,61 +52,61 @@ class Tables:
     def __init__(self, mechanism: SceneMechanism, code: Code, formulas: Formulas):
         self.mechanism, self.linkage, self._code, self._formulas = (
             mechanism, mechanism.linkage, code, formulas)
-        self.solutions: dict[tuple, tuple[str, int, str]] = {}
+        self.solutions: dict[tuple[str, ...], tuple[str, int, str]] = {}
 
-    def text(self, sides: tuple[Sequence[Axis], Sequence[Axis]], tag: str = '',
+    def text(self, name: str, about: str, sides: tuple[Sequence[Axis], Sequence[Axis]],
              passive: Sequence[Axis] = ()) -> str:
         """
-        Return the function for a pose, and the table.
+        Return the function for a pose, and the table of a name, with a line about it.
 
-        `sides` are the actuators and the commanded joints; an inverse alone has no actuators, and
-        a `tag` at the end of its names. `passive` are joints that are not commanded.
+        `sides` are the actuators and the commanded joints; an inverse alone has no actuators.
+        `passive` are joints that are not commanded.
         """
-        row, rows = self._code.row, (sides[0], [*sides[1], *passive])
+        row, rows, n = self._code.row, (sides[0], [*sides[1], *passive]), len(sides[1])
+        solutions = ', '.join(map(self._solutions, sides))
         return filled(template('model.h.in'), {
-            **self._formulas.names, 'tag': tag,
-            'about': 'the inverse' if tag else 'the actuators and joints',
-            'n': len(self.mechanism.scales), 'counts': ', '.join(str(len(axes)) for axes in rows),
-            'names': ', '.join(map(self._solutions, sides)),
-            'at': indented(self._at(rows, len(sides[1]))),
-            'axes': row(row((1.0 / axis.size, axis.turn or math.inf)
-                            for axis in axes) if axes else '{ { 0, 0 } }'
-                        for axes in rows),
-            'inputs': row(self._inputs(sides, has_sweeps=not tag)),
+            'name': self.mechanism.name, 'model': name, 'about': comment(about), 'n': n,
+            'counts': ', '.join(str(len(axes)) for axes in rows), 'solutions': solutions,
+            'inputs': ', '.join(f'p->q[{i}]' for i in range(n)),
+            'values': indented(self._values(rows)),
+            'sum': ' + '.join(f'p->position[{side}][{i}]' for side, axes in enumerate(sides)
+                              for i in range(len(axes))),
+            'axes': row(row((axis.factor, axis.offset, 1.0 / axis.size, axis.turn or math.inf)
+                            for axis in axes) if axes else '{ { 0, 0, 0, 0 } }'
+                           for axes in rows),
+            'rows': row(self._inputs(sides)),
             'start': row(start(self.mechanism))})
 
-    def _at(self, sides: tuple[Sequence[Axis], Sequence[Axis]], commanded: int) -> Iterator[str]:
-        """Yield the statements for values, rates by each input, and loads."""
-        code, formulas, scale_of = self._code, self._formulas, self.mechanism.scale_of
-        needed = []
+    def _values(self, sides: Sequence[Sequence[Axis]]) -> Iterator[str]:
+        """Yield the statements for positions, rates by each input, and loads."""
+        code, fields, scale_of = self._code, self._formulas.fields, self.mechanism.scale_of
+        inputs = range(len(self.mechanism.scales))
         for side, axes in enumerate(sides):
             for i, axis in enumerate(axes):
-                field, factor = formulas.fields[axis.output], axis.factor / scale_of(axis.output)
-                position, *rates = [code.times(f'{struct}.{field}', factor)
-                                    for struct in ('s', *formulas.by)]
+                field, factor = fields[axis.output], axis.factor / scale_of(axis.output)
+                position = code.times(f's.{field}', factor)
                 if axis.offset:
                     position += f' + {code.literal(axis.offset)}'
-                middle = limits.middle(self.mechanism, axis) if i < commanded and sides[0] else 0.0
+                middle = sides[0] and i in inputs and limits.middle(self.mechanism, axis) or 0.0
                 if axis.wraps or middle:
-                    position = (f'lkr_near({position}, {code.literal(middle)}, '
-                                f'{code.literal(axis.turn)})')
+                    position = f'lkr_near({position}, {code.literal(middle)}, ' \
+                               f'{code.literal(axis.turn)})'
                 yield f'p->position[{side}][{i}] = {position};'
-                yield from (f'p->rate[{side}][{i}][{j}] = {rate};' for j, rate in enumerate(rates))
-                needed += [f'p->position[{side}][{i}]'] * (i < commanded)
+                for j in inputs:
+                    yield f'p->rate[{side}][{i}][{j}] = {code.times(f"by[{j}].{field}", factor)};'
         # An inverse alone needs no efforts.
-        for j, by in enumerate(formulas.by if sides[0] else ()):
-            terms = [code.times(f'{by}.{formulas.fields[output]}', -load / scale_of(output))
+        for j in inputs if sides[0] else ():
+            terms = [code.times(f'by[{j}].{fields[output]}', -load / scale_of(output))
                      for output, load in loads(self.mechanism)]
             yield f'p->load[{j}] = {" + ".join(terms) or code.literal(0.0)};'
-        yield f'return isfinite({" + ".join(needed)});'
 
     # --- tables ---
 
-    def _inputs(self, sides: Sequence[Sequence[Axis]], has_sweeps: bool) -> Iterator[tuple]:
+    def _inputs(self, sides: Sequence[Sequence[Axis]]) -> Iterator[tuple]:
         """Yield the rows of the inputs, as `lkr_input` has them."""
         counted = [{axis.input for axis in axes} for axes in sides]
         for i, settings in enumerate(self.mechanism.inputs.values()):
-            input_, sweep = self.linkage.inputs[i], has_sweeps and settings.ends
+            input_, sweep = self.linkage.inputs[i], sides[0] and settings.ends
             turns = [input_.turn if input_.wraps and i not in inputs else math.inf
                      for inputs in counted]
             size = self.mechanism.scales[i] * input_.size
@@ -119,48 +119,40 @@ class Tables:
         outputs = tuple(axis.output for axis in axes)
         if not axes:
             return '0'
-        # Axes of the same outputs may have other signs and offsets.
-        key = tuple((axis.output, axis.factor, axis.offset) for axis in axes)
-        if key not in self.solutions:
+        if outputs not in self.solutions:
             name = '_'.join([f'{self.mechanism.name}_solutions', *(
                 self._formulas.fields[output] for output in outputs)])
             *_, name = distinct([*(known for known, *_ in self.solutions.values()), name])
+            head = (f'static inline int {name}(const lkr_real *value,\n'
+                    '    lkr_real (*q)[LKR_MAX_INPUTS])')
             counted = {axis.input: (argument(i) - shift) / ratio
                        for i, axis in enumerate(axes) if axis.input is not None
                        for ratio, shift in [self.linkage.gear(axis.output, axis.input)]}
             if len(counted) == len(axes):
-                generated = self._function(name, axes, 'The inputs.', [('', counted)])
+                made = self._function(f'/* The inputs. */\n{head}', [('', counted)])
             elif closed := self.linkage.inverse(outputs).closed:
-                generated = self._closed(name, axes, counted, closed)
+                made = self._closed(head, outputs, counted, closed)
             else:
-                generated = self._series(name, *axes)
-            self.solutions[key] = name, *generated
-        return self.solutions[key][0]
+                made = self._series(head, outputs[0])
+            self.solutions[outputs] = name, *made
+        return self.solutions[outputs][0]
 
-    def _value(self, i: int, axis: Axis) -> str:
-        """Return the output, in its own units, of an axis at position i."""
-        code, literal = f'position[{i}]', self._code.literal
-        if axis.offset:
-            code = f'({code} - {literal(axis.offset)})'
-        return code if axis.factor == 1.0 else f'{code} / {literal(axis.factor)}'
-
-    def _series(self, name: str, axis: Axis) -> tuple[int, str]:
+    def _series(self, head: str, output: str) -> tuple[int, str]:
         """Return the most inputs of an output, and the function for them by series."""
-        code, monotone = self._code, self.linkage.monotone(axis.output)
-        pieces = series(self.linkage, axis.output, monotone, code.single, *self.mechanism.scales)
-        rows = [f'    {code.row([*row[:7], row[7:]])},' for row in pieces.tolist()]
-        arguments = ', '.join([*(code.literal(value / abs(axis.factor)) for value in (
-            axis.size, axis.turn or math.inf)), self._value(0, axis)])
-        # Where two pieces of a monotone part meet, both have the input.
-        return min(len(rows), 2 * len(monotone)), '\n'.join([
-            f'/* The inputs of an output, in each of {len(rows)} pieces of the reach. */',
-            f'static inline int {name}(const {code.number} *position,',
-            f'    {code.number} (*q)[LKR_MAX_INPUTS])', '{',
-            f'    static const lkr_piece piece[{len(rows)}] LKR_IN_FLASH = {{',
-            indented(rows), '    };',
-            f'    return lkr_series({len(rows)}, piece, {arguments}, q);', '}'])
+        row, linkage = self._code.row, self.linkage
+        monotone = linkage.monotone(output)
+        pieces = series(linkage, output, monotone, self._code.single, *self.mechanism.scales)
+        is_angle, n = linkage.is_angle(output), len(pieces)
+        return min(n, 2 * len(monotone)), '\n'.join([
+            # Where two pieces of a monotone part meet, both have the input.
+            f'/* The inputs of an output, in each of {n} pieces of the reach. */',
+            head, '{', f'    static const lkr_piece piece[{n}] LKR_IN_FLASH = {{',
+            indented(f'    {row([*each[:7], each[7:]])},' for each in pieces.tolist()), '    };',
+            f'    return lkr_series({n}, piece, '
+            f'{self._code.literal(1.0 if is_angle else linkage.longest)}, '
+            f'{self._code.literal(math.tau if is_angle else math.inf)}, *value, q);', '}'])
 
-    def _closed(self, name: str, axes: Sequence[Axis], counted: Mapping[int, Real],
+    def _closed(self, head: str, outputs: Sequence[str], counted: Mapping[int, Real],
                 closed: InverseLinkage) -> tuple[int, str]:
         """Return the number of solutions of an inverse linkage, and the function for them."""
         candidates, solutions = closed.solutions(), []
@@ -172,25 +164,20 @@ class Tables:
                                   for joint, sign in zip(closed.branches, signs))
                 solutions.append((f'/* {sides} */' if sides and not any(turns) else '', {
                     i: counted.get(i, value) for i, value in enumerate(inputs)}))
-        if len(axes) == 1:
-            solutions = [solutions[k] for k in self._in_reach(
-                axes[0].output, candidates)] or solutions
-        lines = ''.join(f'\n     {comment(line)}' for line in closed.lines)
-        return self._function(
-            name, axes, 'The inputs in each assembly mode of the inverse linkage, NAN where there '
-            f'is none:{lines}\n', solutions)
+        if len(outputs) == 1:
+            solutions = [solutions[k] for k in self._in_reach(outputs[0], candidates)] or solutions
+        lines = '\n     '.join(map(comment, closed.lines))
+        return self._function('/* The inputs in each assembly mode of the inverse linkage, NAN '
+                              f'where there is none:\n     {lines}\n */\n{head}', solutions)
 
-    def _function(self, name: str, axes: Sequence[Axis], about: str,
-                  solutions: Sequence[tuple[str, Mapping[int, Real]]]) -> tuple[int, str]:
+    def _function(self, head: str, solutions: Sequence[tuple[str, Mapping[int, Real]]]
+                  ) -> tuple[int, str]:
         """Return the number of solutions, each a line above it and inputs, and the function."""
-        number, scales = self._code.number, self.mechanism.scales
+        scales = self.mechanism.scales
         return len(solutions), self._code.function(
-            f'/* {about} */\nstatic inline int {name}(const {number} *position,\n'
-            f'    {number} (*q)[LKR_MAX_INPUTS])',
-            [self._value(i, each) for i, each in enumerate(axes)],
+            head, [f'value[{i}]' for i in range(len(scales))],
             [(above, {f'q[{k}][{i}]': value * scales[i] for i, value in inputs.items()})
-             for k, (above, inputs) in enumerate(solutions)],
-            f'return {len(solutions)};')
+             for k, (above, inputs) in enumerate(solutions)], f'return {len(solutions)};')
 
     def _in_reach(self, output: str, solutions: list[list[Real]]) -> list[int]:
         """Return which solutions of a closed form the linkage has anywhere in its reach."""

@@ -5,13 +5,11 @@
 
 from pathlib import Path
 import sys
-from typing import Sequence
 
 from . import limits
 from .cli import parser, with_joints
-from .package import PACKAGE, package
+from .package import package
 from .. import cli, scene
-from ..scene import SceneMechanism
 
 NAME = 'transmission'
 
@@ -29,33 +27,20 @@ def write(args: list[str] | None) -> None:
         mechanisms = with_joints(chosen, options.joints)
         if options.limits:
             print('\n'.join(line for each in mechanisms for line in limits.lines(*each)))
-        else:
-            write_package(options.out, Path(options.scene).name, mechanisms)
+            return
+        out = Path(options.out).absolute()
+        files = package(out.name, Path(options.scene).name, mechanisms)
     except ValueError as error:
         raise cli.RequestError(str(error)) from None
-
-
-def write_package(folder: str, scene_file: str,
-                  mechanisms: Sequence[tuple[SceneMechanism, Sequence[str]]]) -> None:
-    """Write the package of mechanisms with their commanded joints."""
-    out = Path(folder).absolute()
-    if not PACKAGE.fullmatch(out.name):
-        raise cli.RequestError(
-            "--out must end in the package's name: 2 to 64 lower-case letters, digits and single "
-            f'underscores, a letter first, not {out.name!r}')
-    if out.exists() and any(out.iterdir()) and not is_ours(out):
-        raise cli.RequestError('--out must be a new folder, or one written by this command, '
-                               f'but {out} has other files')
-    for path, text in package(out.name, scene_file, mechanisms).items():
+    xml = out / 'package.xml'
+    if xml.exists() and 'written by linkage_ros' not in xml.read_text(errors='replace'):
+        raise cli.RequestError('--out must be a new folder, or one written by this command, but '
+                               f'{xml} is of another package')
+    for path, text in files.items():
         (out / path).parent.mkdir(parents=True, exist_ok=True)
         (out / path).write_text(text, encoding='utf-8')
-    print(f'{out}: {", ".join(mechanism.name for mechanism, _ in mechanisms)}; see README.md')
-
-
-def is_ours(folder: Path) -> bool:
-    """Return whether a folder is a package of this command."""
-    xml = folder / 'package.xml'
-    return xml.is_file() and 'written by linkage_ros' in xml.read_text(errors='replace')
+    names = ', '.join(mechanism.name for mechanism, _ in mechanisms)
+    print(f'{out}: {names}; see urdf/transmissions.xml')
 
 
 def arguments() -> cli.Parser:

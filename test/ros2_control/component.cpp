@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 // A hardware component that loads transmissions from libraries and calls them, with functions for
-// the tests: component_made, component_read, component_write, component_status, component_ended.
+// the tests: component_made, component_read, component_write, component_ended.
 #include <dlfcn.h>
 
 #include <cstdlib>
@@ -11,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "linkage_ros/linkage_transmission.hpp"
 #include "transmission_interface/exception.hpp"
 #include "transmission_interface/transmission_loader.hpp"
 
@@ -100,14 +99,6 @@ const char * component_problem() { return problem.c_str(); }
 void component_read(Component * component) { component->transmission->actuator_to_joint(); }
 
 void component_write(Component * component) { component->transmission->joint_to_actuator(); }
-
-/// The status, or -1 if the transmission has none.
-int component_status(const Component * component)
-{
-  const auto own =
-    dynamic_cast<const linkage_ros::LinkageTransmission *>(component->transmission.get());
-  return own ? own->status() : -1;
-}
 
 void component_ended(Component * component) { delete component; }
 }
