@@ -66,10 +66,11 @@ view: build ## Show SCENE=config/all.yaml in the browser, at PORT=8020
 
 # Pages are written by the same commands with --document, of a commit alone.
 .PHONY: bench
-bench: ready .venv-bench/.installed ## Measure run time against error, stability, inverses, calls, nodes, C
+bench: ready .venv-bench/.installed ## Measure run time against error, stability, inverses, rods, calls, nodes, C
 	@.venv-bench/bin/python -m benchmark.run
 	@.venv-bench/bin/python -m benchmark.stability --samples 500 --linkages 50
 	@.venv-bench/bin/python -m benchmark.inverse_rule --linkages 50 --minutes 5
+	@.venv-bench/bin/python -m benchmark.rods --ankles 2 --pairs 20000
 	@$(in_ros) python -m benchmark.calls
 	@$(in_ros) python -m benchmark.nodes --quick
 	@$(in_ros) python -m benchmark.c_code

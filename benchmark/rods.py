@@ -6,10 +6,11 @@ Measure ankles on two rods: their set-up with its proof, refusals, and poses aga
 
     python -m benchmark.rods [--ankles 5] [--pairs 100000] [--document]
 
-Random ankles get the largest limits that are proved. Motor pairs of the whole circle are held to
-the real roots of the polynomial of degree eight (test/truth/rods.py). Exits with 1 if a window
-has a second pose, or if a pose is another one, is missing or is invented. With --document the
-table goes into docs/design/rods.md.
+Those of public models have the ranges of their makers, random ones the largest limits that are
+proved; refused are 1.6 rad of pitch and 1.4 rad of roll to each side. Motor pairs of the whole
+circle are held to the real roots of the polynomial of degree eight (test/truth/rods.py). Exits
+with 1 if a window has a second pose, or if a pose is another one, is missing or is invented. With
+--document the table goes into docs/design/rods.md.
 """
 
 import sys
@@ -26,6 +27,8 @@ from . import document
 CHUNK = 5000
 # A root this near to the edge of the limits [rad] is in them or not, but for rounding.
 EDGE = 1e-6
+# Limits of pitch and roll that are refused [rad].
+WIDE = [-1.6, -1.4], [1.6, 1.4]
 
 
 def created(lines):
@@ -39,13 +42,17 @@ def created(lines):
 
 
 def ankles(count):
-    """Yield random ankles with the largest limits that are proved, and the time of a refusal."""
+    """Yield public and random ankles, with a name, a window and the time of a refusal."""
+    for name, (parts, window) in rods.REAL.items():
+        ankle = rods.drawn(*parts)
+        error, refusal = created(ankle.within(*WIDE))
+        yield name, ankle, window, refusal if isinstance(error, WindowError) else None
     rng = np.random.default_rng(0)
     while count:
         ankle = rods.random_ankle(rng)
-        error, refusal = created(ankle.within([-1.6, -1.4], [1.6, 1.4]))
+        error, refusal = created(ankle.within(*WIDE))
         if ankle.motor_axes[0] is not None and getattr(error, 'limits', None):
-            yield ankle, np.transpose([*error.limits.values()]), refusal
+            yield f'random {count}', ankle, np.transpose([*error.limits.values()]), refusal
             count -= 1
 
 
@@ -69,16 +76,18 @@ def main():
     parser.add_argument('--ankles', type=int, default=5)
     parser.add_argument('--pairs', type=int, default=100_000, help='motor pairs for each ankle')
     options, rows, bad = parser.parse_args(), [], 0
-    for i, (ankle, window, refusal) in enumerate(ankles(options.ankles)):
+    for i, (name, ankle, window, refusal) in enumerate(ankles(options.ankles)):
         linkage, setup = created(ankle.within(*window))
         rng, counts = np.random.default_rng(i), np.zeros(3, int)
         for _ in range(-(-options.pairs // CHUNK)):
             counts += wrong(ankle, window, linkage, rng.uniform(-np.pi, np.pi, (2, CHUNK)))
         bad += counts.sum()
-        rows.append([i, f'{setup:.0f}', f'{refusal:.0f}', options.pairs, *counts])
-    document.show(options, 'design/rods.md', document.table(
+        rows.append([name, f'{setup:.0f}', f'{refusal:.0f}' if refusal else 'proved',
+                     options.pairs, *counts])
+    text = document.table(
         ['ankle', 'set-up [ms]', 'refusal [ms]', 'motor pairs', 'second poses', 'other or missing',
-         'invented'], rows), 'measured: windows')
+         'invented'], rows) + '\n\n' + document.machine()
+    document.show(options, 'design/rods.md', text, 'measured: windows')
     return int(bad > 0)
 
 

@@ -368,8 +368,10 @@ def test_a_ring_that_spins_on_a_pin_is_no_dead_point(tmp_path):
         f'<child link="{ring}"/><axis xyz="0 1 0"/></joint>'
         for ring, foot in (('ring_a', 'front_foot'), ('ring_b', 'back_foot'))) + '</robot>'))
     mechanism, = imported(file, *loops)
-    assert 'Left out: ring_a: held more than once by ring_a_pin, ring_b_pin.' in said(file, *loops)
+    assert 'Left out: ring_a: not driven: 1 of ring_a_pin, ring_b_pin must be moved or held: ' \
+        in said(file, *loops)
     assert 'Not published: ring_a_pin, ring_b_pin: ' in said(file, *loops)
+    assert 'Left out' not in said(file, *loops, '--hold', 'ring_a_pin=0')
     check_closed(Pinocchio((ROBOTS / 'five_bar.urdf').read_text()),
                  published(mechanism, mot_front=0.3, mot_back=0.1), FEET)
 
@@ -471,8 +473,7 @@ def test_a_passive_joint_of_a_loop_is_no_input(tmp_path):
     assert {*lost} == loop and not loop & {*map(str, rest.values())}
     assert f'Not published: {", ".join(lost)}: passive joints of loops' in line
     assert re.search('Left out: .*right_coupler, right_spring_link, right_follower: not driven: '
-                     '1 of right_spring_link_joint, .* must be moved, named by --driven, or held, '
-                     'named by --hold', line)
+                     '1 of right_spring_link_joint, .* must be moved or held: add --driven', line)
     rest, lost = cli.others(robot, mechanisms, {'spring': 0.0})
     assert {*lost} == loop - {'spring'} and 'spring' in {*map(str, rest.values())}
 
@@ -532,7 +533,7 @@ def test_world_of_drake_is_no_second_root(tmp_path):
 
 
 BALLS = '{pin_loops: [], ball_loops: [{parent: coupler, child: rocker, parent_xyz: [0.3, 0, 0], ' \
-    'child_xyz: [0, 0, 0.2]}], joint_name: [elbow], joint_type: [SPHERICAL], independent: [motor]}'
+    'child_xyz: [0, 0, 0.2]}], ball_upgrades: [elbow], actuated_joints: [motor]}'
 PAIRS = '{closed_loop: [[wrist_a, wrist_b]], type: [3d], name_mot: [motor], ' \
     'joint_name: [elbow], joint_type: [%s]}'
 CUT = re.compile('<loop_joint.*</loop_joint>', re.DOTALL)
@@ -540,10 +541,10 @@ CUT = re.compile('<loop_joint.*</loop_joint>', re.DOTALL)
 
 @pytest.mark.parametrize('text', [BALLS, PAIRS % 'SPHERICAL', PAIRS % 'UJOINT_YX'])
 def test_joints_of_the_tree_are_what_a_file_of_loops_makes_them(tmp_path, text):
-    # A transmission is of the open tree.
-    file = of_text(tmp_path / 'four_bar.urdf', CUT.sub(
-        '<transmission name="t"><joint name="shoulder"/></transmission>',
-        (ROBOTS / 'four_bar.urdf').read_text()))
+    # A transmission is of the open tree, in which a ball is fixed.
+    file = written(tmp_path, 'four_bar.urdf', ('elbow" type="continuous"', 'elbow" type="fixed"'))
+    of_text(file, CUT.sub('<transmission name="t"><joint name="shoulder"/></transmission>',
+                          file.read_text()))
     loops = of_text(tmp_path / 'loops.yaml', text)
     mechanism, = imported(file, '--loops', loops)
     for angle in (-1.1, 0.0, 0.7):

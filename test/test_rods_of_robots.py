@@ -108,11 +108,15 @@ def test_an_ankle_that_differs_from_its_robot_is_refused(ankle_of_a_robot, old, 
         *ankle_of_a_robot, 'l_rods', old, new, 'l', 'r'))
 
 
-def test_an_ankle_on_a_cross_is_imported(tmp_path):
-    # As most are: both hinges of the foot cross in a point, and are no ball all the same.
-    ankle = turning(3)
-    ankle = ankle._replace(second=ankle.first)
-    check_rods(ankle, *imported(of_text(tmp_path / 'robot.xml', mjcf(ankle, NEAR))))
+@pytest.mark.parametrize('robot', rods.REAL)
+def test_the_ankle_of_a_public_model_is_imported_with_its_range(tmp_path, robot):
+    # Both hinges of some feet cross in a point, and are no ball all the same; their motors turn
+    # about one of them, and are no planar linkage.
+    parts, limits = rods.REAL[robot]
+    ankle = rods.drawn(*parts)
+    file = of_text(tmp_path / 'robot.xml', mjcf(ankle, limits))
+    assert 'Limits' not in said(file)
+    check_rods(ankle, *imported(file))
 
 
 @pytest.mark.parametrize('seed, count', [(1, 2), (2, 3)])

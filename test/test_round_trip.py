@@ -13,7 +13,7 @@ from linkage_ros.robot_model import bodies, mjcf, sdf, urdf
 from linkage_ros.robot_model.robot import with_positions
 import numpy as np
 import pytest
-from robots import of_text, ROBOTS, turned
+from robots import FIRST, of_text, ROBOTS, turned
 from scenes import EXAMPLES
 from test_robot_files import moves, random_linkage
 from test_urdf import ARM
@@ -26,6 +26,8 @@ def check_read(robot, form, folder):
     file = of_text(folder / 'robot.xml', FORMATS[form](robot))
     read, root = readers.read(str(file)), {'urdf': robot.root}.get(form, 'world')
     if form == 'urdf':
+        # A library's parser sees the same joints; an MJCF is read by MuJoCo.
+        assert {*FIRST(file.read_text()).joints} == robot.positions.keys()
         robot = with_positions(robot, dict.fromkeys(robot.positions, 0.0))
     # The pose of the ground that carries each body.
     frames, stands = ({robot.root: np.eye(4)} for _ in range(2))

@@ -175,10 +175,6 @@ class Dyads:
         """Return an angle [rad] as 0 to 3 quarter turns; None if the line has the angle itself."""
         return None
 
-    def position(self, joint: Any) -> float:
-        """Return the approximate position of a joint's motor."""
-        return 0.0
-
     def special_line(self, place: complex, other: complex, first: Pin, second: Pin) -> str | None:
         """Return a more specific line than `dyad` for two bars, or None."""
         return None
@@ -315,10 +311,9 @@ class Dyads:
         on = along / slide.axes[way]
         sign = (-1.0 if way else 1.0) * math.copysign(1.0, on.real)
         number, geared = self.drive('carriage', slide.joint, sign, 0.0)
-        low, high = (sign * self.position(slide.joint) + end for end in (
-            -self.farthest, self.farthest))
         name = self.name(place, body, f'carriage {origin} along {towards} '
-                         f'{self.length_text(low)} {self.length_text(high)}{geared}')
+                         f'{self.length_text(-self.farthest)} {self.length_text(self.farthest)}'
+                         f'{geared}')
         return self.place(body, Part(f'carriage{number}', name, slide.axes[1 - way] * on,
                                      slide.joint, start))
 

@@ -110,7 +110,7 @@ def compared(robot: Robot, mechanisms: Mapping[str, scene.SceneMechanism],
     reports: list[str] = []
     wrong: dict[str, str] = {}
     for component in components(robot):
-        parts = [made for made in imported if {*made.driven} & component.positions.keys()]
+        parts = [made for made in imported if {*made.driven} & component.named.keys()]
         if parts:
             try:
                 reports.append(_Loops(robot, component, mechanisms, parts).report())
@@ -134,7 +134,7 @@ class _Loops:
                  mechanisms: Mapping[str, scene.SceneMechanism], parts: Sequence[Imported]):
         self._component, self._parts = component, parts
         self._mechanisms = [mechanism for name, mechanism in mechanisms.items()
-                            if published({name: mechanism}) & component.positions.keys()]
+                            if published({name: mechanism}) & component.named.keys()]
         self._motors = {name: robot.source(name) for made in parts for name in made.driven}
         # Where each source starts, and between which positions it moves.
         self._start = {drive.source: robot.positions[drive.source]
@@ -158,10 +158,9 @@ class _Loops:
             self._ends.get(source, (value,) * 2) for source, value in self._start.items()]).T
         walk, beyond = self._walk_to(corners if len(self._ends) == 1 else np.random.default_rng(
             1).uniform(low, high, (PATHS, len(low))))
-        moved = ', '.join(f'{source} from {min(values.min(), first):.4g} to '
-                          f'{max(values.max(), first):.4g}' for source in self._ends
-                          for first, values in [(self._start[source],
-                                                 walk.joints[source][walk.good])])
+        moved = ', '.join(
+            f'{source} from {min(values):.4g} to {max(values):.4g}' for source in self._ends
+            for values in [[self._start[source], *walk.joints[source][walk.good]]])
         names, gaps = ', '.join(made.name for made in self._parts), walk.gaps[walk.good]
         return (f'Checked: {names}: in {gaps.size} poses of the robot, {moved}, its loops stand '
                 f'open by {gaps.max():.0e} m at most{beyond}.')
@@ -172,7 +171,7 @@ class _Loops:
         start = self._positions({name: np.array([value]) for name, value in self._start.items()})
         seen = component.read(component.moved_to(component.start, start))
         for name in start:
-            off = float(seen[name][0]) - component.positions[name]
+            off = float(seen[name][0] - component.read(component.start)[name][0])
             off = abs(off) / component.unit[component.named[name]]
             if off > OTHER + self._slack:
                 raise Difference(f'{self._at(self._start)} {name} is off by {off:.2g}')
@@ -235,8 +234,7 @@ class _Loops:
             angles = mechanism.linkage.joint_angles(theta_of(values))
             positions.update((called.name, called.of(angles[link]))
                              for link, called in mechanism.joints.items() if called.published)
-        named = self._component.named
-        return {name: values for name, values in positions.items() if name in named}
+        return {name: at for name, at in positions.items() if name in self._component.named}
 
     def _check_end(self, walk: Walk, path: int, step: int) -> None:
         """

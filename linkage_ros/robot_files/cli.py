@@ -98,7 +98,7 @@ def described(robot: Robot) -> tuple[dict[str, Any], list[str], dict[str, float]
             for part in group.parts:
                 # What is no planar mechanism may be a part of one in space.
                 with suppress(*_FAULTS if group.why else ()):
-                    imported.append(planar.described(robot, part, imported))
+                    imported.append(planar.described(robot, part, imported, fault))
                     joints = [joint for joint in joints if joint not in part.joints]
             if joints:
                 imported.append(rods.described(robot, group._replace(joints=joints), imported))
@@ -121,9 +121,8 @@ def _checked(robot: Robot, balls: Sequence[Sequence[str]], imported: Sequence[ch
         raise cli.RequestError(*reports or [
             'no joint of this robot closes a loop; those of a URDF are in a file of their own: '
             '--loops FILE'])
-    parameters: dict[str, Any] = {'mechanisms': [made.name for made in imported]}
-    for made in imported:
-        parameters.update(made.parameters)
+    parameters = {'mechanisms': [made.name for made in imported], **{
+        key: value for made in imported for key, value in made.parameters.items()}}
     mechanisms = scene.read(parameters).mechanisms
     known = check.published(mechanisms)
     # Of a ball of which some hinges turn the others stay.

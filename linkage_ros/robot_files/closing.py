@@ -75,16 +75,14 @@ def closed(robot: Robot, seed: int = 0) -> Closed:
     If that does not determine a pose, joints outside their limits start inside them. The `seed`
     is that of the starts of a search, on which no answer may depend.
     """
-    made = _closed(robot, seed)
-    if not made.faults:
-        return made
     inside = {}
     for joint in robot.joints:
         low, high = joint.range
         if joint.position is not None and not low <= joint.position <= high:
             margin = INSIDE * min(high - low, 1.0)
             inside[joint.name] = low + margin if joint.position < low else high - margin
-    other = _closed(with_positions(robot, inside), seed)
+    made = _closed(robot, seed)
+    other = _closed(with_positions(robot, inside), seed) if made.faults and inside else made
     if len(other.faults) >= len(made.faults):
         return made
     where = ', '.join(f'{name} at {value:.4g}' for name, value in inside.items())
@@ -101,14 +99,13 @@ def _closed(robot: Robot, seed: int) -> Closed:
     moves: dict[str, np.ndarray] = {}
     positions: dict[str, float] = {}
     for component in components(robot):
-        motors = [name for name in component.positions if name in robot.driven]
-        followers = robot.followers(component.positions)
+        motors = [name for name in component.named if name in robot.driven]
+        followers = robot.followers(component.named)
         try:
             pose, report = nearest(component, motors, followers, seed)
             made.report.extend([report] * bool(report))
             moves.update(component.moves(pose))
-            positions.update((name, float(value[0]))
-                             for name, value in component.read(pose[None]).items())
+            positions.update((name, float(at)) for name, at in component.read(pose).items())
             apart = np.linalg.norm(component.errors(pose[None])[0].reshape(-1, 3), axis=1).max()
             if apart > LEANING * component.size:
                 raise ValueError(f'its loops cannot be closed: they stay open by {apart:.3g} m, '
@@ -132,29 +129,29 @@ def _check_driven(component: Component, pose: np.ndarray, motors: list[str], fol
     if not component.loose(pose, [], LEANING)[0]:
         fixed = [joint.name for joint in component.joints
                  if joint.kind == FIXED and joint.is_cut and joint.name]
-        raise ValueError('it cannot move, as its joints hold each other' + (
-            f': {join_names(fixed)} makes one body of two, where a pin has the type 3d'
-            if fixed else ''))
+        raise ValueError('it cannot move, as its joints hold each other' + bool(fixed) * (
+            f': {join_names(fixed)} makes one body of two, where a pin has the type 3d'))
     motions = component.free_ways(pose, component.is_of([]), LEANING)
     count = len(chosen := component.chosen(motions, motors))
     if count < len(motors):
         # Motors that nothing lets move are replaced.
-        chosen = chosen or component.chosen(motions, [*component.positions])
+        chosen = chosen or component.chosen(motions, [*component.named])
         raise ValueError(
             f'{join_names(motors)} drive it, and hold each other, as {count} of them tell where '
-            f'all is: {_added(("driven", chosen))}, in place of these')
+            f'all is: replace them by --driven {shlex.join(chosen)} in the command')
     loose, motions = component.loose(pose, motors + followers)
     if not loose:
         return
     _check_unfolded(component, pose, motors, DEAD_POINT)
     stiff = [joint.name for joint in component.joints if joint.name in loose
              and joint.no_limits.endswith('no range')]
-    more = component.chosen(motions, loose, stiff)
-    at = component.texts(pose, component.is_of(more))
+    more = component.chosen(motions, sorted(loose, key=lambda name: name not in stiff))
+    # Held, they must not stop all others.
+    holds = [('hold', component.texts(pose, component.is_of(more)).values())] * bool(
+        component.loose(pose, more)[0])
     raise NotDriven(
-        f'not driven: {len(more)} of {join_names(loose)} must be moved, named by --driven, or '
-        'held, named by --hold: '
-        + _added(('driven', [*motors, *more]), ('hold', (at[name] for name in more)))
+        f'not driven: {len(more)} of {join_names(loose)} must be moved{" or held" * len(holds)}: '
+        + _added(('driven', [*motors, *more]), *holds)
         + f'; the limits of {join_names(stiff)} leave no range' * bool(stiff))
 
 
@@ -186,11 +183,8 @@ def _check_unfolded(component: Component, pose: np.ndarray, motors: list[str], l
     """Raise ValueError at a dead point, which a linkage can leave in two ways."""
     if not motors:
         # Without motors, drive a joint that this pose does not stop.
-        motions = component.free_ways(pose, component.is_of([]), least)
-        if len(motions) <= component.nullity(component.is_of([])):
-            return
-        sizes = np.linalg.norm(motions, axis=0)
-        motors = [max(component.named, key=lambda name: sizes[component.named[name]])]
+        sizes = np.linalg.norm(component.free_ways(pose, component.is_of([]), least), axis=0)
+        motors = [max(component.named, key=lambda name: sizes[component.named[name]], default='')]
     fixed = component.is_of(motors)
     questions: list[Question] = []
     steps = sorted((pose + ahead * component.unit * fixed for ahead in (ASIDE, -ASIDE)),
@@ -260,11 +254,9 @@ def nearest(component: Component, motors: list[str], followers: list[str], seed:
         distances = np.linalg.norm(component.away(some) * determined, axis=1)
         first, *more = np.argsort(distances + NEARLY * np.linalg.norm(some, axis=1))
         pose[which] = some[first, which]
-        for i in more:
-            alike = distances[i] < ALIKE * distances[first] + ALIKE_LENGTH
-            if alike and (question := _question(component, some[[first, i]], determined)):
-                questions += question
-                break
+        choices = (_question(component, some[[first, i]], determined) for i in more
+                   if distances[i] < ALIKE * distances[first] + ALIKE_LENGTH)
+        questions += next(filter(None, choices), [])
     if questions:
         raise _choice(questions, 'the file has them open, and they close as well')
     return pose, report

@@ -81,12 +81,8 @@ def _groups(robot: Robot, joints: list[Joint]) -> list[Group]:
         edges = {tree[body][1] for body in bodies} | {*closures}
         # The parent of the first body is nearest to the root.
         ground = next(base for body, (base, _) in tree.items() if body in bodies)
-        group = Group(ground, [joint for joint in joints if joint in edges], '', [])
-        try:
-            _check_planar(ground, group.joints)
-        except ValueError as error:
-            group = group._replace(why=str(error))
-        groups.append(group)
+        inside = [joint for joint in joints if joint in edges]
+        groups.append(Group(ground, inside, _why_not_planar(ground, inside), []))
     return groups
 
 
@@ -116,22 +112,25 @@ def chain(joint: Joint, start: str) -> Sequence[tuple[Joint, float]]:
     return parts if joint.bodies[0] == start else [(hinge, -sign) for hinge, sign in parts[::-1]]
 
 
-def _check_planar(ground: str, joints: Sequence[Joint], drives: Sequence[str] = ()
-                 ) -> list[Joint]:
-    """Return the hinges, the first of which has the plane's normal; raise ValueError if none."""
-    hinges = sorted((joint for joint in joints if joint.kind == HINGE),
-                    key=lambda joint: (joint.name not in drives, ground not in joint.bodies))
+def _hinges(ground: str, joints: Sequence[Joint], drives: Sequence[str] = ()) -> list[Joint]:
+    """Return the hinges, of which the first has the plane's normal."""
+    return sorted((joint for joint in joints if joint.kind == HINGE),
+                  key=lambda joint: (joint.name not in drives, ground not in joint.bodies))
+
+
+def _why_not_planar(ground: str, joints: Sequence[Joint]) -> str:
+    """Return why loops are not planar; '' if they are."""
+    hinges = _hinges(ground, joints)
     if not hinges:
-        raise ValueError('not planar: no hinge says in which plane')
+        return 'not planar: no hinge says in which plane'
     for joint in joints:
         if joint.kind not in _FLAT:
-            raise ValueError(f'not planar: {joint.name} is a joint of type {joint.kind}')
+            return f'not planar: {joint.name} is a joint of type {joint.kind}'
         if (askew := lean(joint, hinges[0].axes[0])) > ASKEW:
-            raise ValueError(f'not planar: the axes of {hinges[0].name} and {joint.name} are '
-                             f'{np.degrees(np.arcsin(min(askew, 1.0))):.3g} degrees from it, more '
-                             f'than {np.degrees(ASKEW):.2g}')
-    _check_rods(ground, joints, hinges[0].axes[0])
-    return hinges
+            return (f'not planar: the axes of {hinges[0].name} and {joint.name} are '
+                    f'{np.degrees(np.arcsin(min(askew, 1.0))):.3g} degrees from it, more '
+                    f'than {np.degrees(ASKEW):.2g}')
+    return _why_loose(ground, joints, hinges[0].axes[0])
 
 
 def _pins(joint: Joint, normal: np.ndarray) -> list[tuple[Joint, float]]:
@@ -140,19 +139,24 @@ def _pins(joint: Joint, normal: np.ndarray) -> list[tuple[Joint, float]]:
             if hinge.kind == HINGE and lean(hinge, normal) < ASKEW]
 
 
-def _check_rods(ground: str, joints: Sequence[Joint], normal: np.ndarray) -> None:
-    """Raise ValueError if a body can leave the plane: only rods may be on balls alone."""
+def _why_loose(ground: str, joints: Sequence[Joint], normal: np.ndarray) -> str:
+    """Return which body can leave the plane, '' if none: only rods may be on balls alone."""
     held = {ground}
-    # A universal joint with an axis normal to the plane is a pin.
     held_by = [joint for joint in joints if joint.kind != BALL
                or len(joint.hinges) == 2 and _pins(joint, normal)]
+    # A universal joint with an axis normal to the plane is a pin, but a body can lean on it that
+    # has no other pin.
+    pinned = [ground, *(body for joint in held_by for body in joint.bodies)]
+    held_by = [joint for joint in held_by if joint.kind != BALL
+               or min(map(pinned.count, joint.bodies)) > 1]
     while more := {end for joint in held_by for end in joint.bodies
                    if held & {*joint.bodies}} - held:
         held |= more
     for body in dict.fromkeys(end for joint in joints for end in joint.bodies):
         ends = [joint.bodies for joint in joints if body in joint.bodies]
         if body not in held and (len(ends) != 2 or not all(held & {*pair} for pair in ends)):
-            raise ValueError(f'not planar: {body} hangs on balls alone, and is no rod')
+            return f'not planar: {body} hangs on balls alone, and is no rod'
+    return ''
 
 
 class Drawing(Dyads):
@@ -176,7 +180,7 @@ class Drawing(Dyads):
     Raises
     ------
     ValueError
-        If it is not planar, or not closed.
+        If it is not closed.
 
     """
 
@@ -209,12 +213,13 @@ class Drawing(Dyads):
             [slides.get(joint) or Hinge(joint.bodies, joint.places, joint.axes[0],
                                         -joint.axes[0] * joint.start, joint)
              for joint in self.driven], size, near)
+        self.farthest += max([0.0, *(abs(joint.start) for joint in slides)])
         self.decompose()
 
     def _flatten(self, group: Group, drives: Sequence[str]) -> None:
         """Set the plane, and the joints in it."""
         ground = group.ground
-        hinges = _check_planar(ground, group.joints, drives)
+        hinges = _hinges(ground, group.joints, drives)
         base, up = self._robot.frames[ground], hinges[0].axes[0]
         self.lean = max(lean(joint, up) for joint in group.joints)
         normal = base[:3, :3].T @ up
@@ -258,10 +263,8 @@ class Drawing(Dyads):
             raise ValueError(joint.name)
         parent, child = joint.bodies
         if joint.kind == SLIDE:
-            block = child if self.parts[child].slide is joint else parent
+            block, = (body for body in joint.bodies if self.parts[body].slide is joint)
             part = self.parts[block]
-            if part.slide is not joint:
-                raise ValueError(joint.name)
             sign = math.copysign(1.0, (part.along / joint.motion(block)).real)
             way = (self.on[block][part.joint] - part.start) / part.along
             return part.link, sign, way.real
@@ -309,10 +312,6 @@ class Drawing(Dyads):
         self.drives.append(check.Source(word + number, source, ratio, offset, value))
         return number, ''
 
-    def position(self, joint: Joint) -> float:
-        """Return the position of a joint's motor in the file."""
-        return joint.start
-
     def special_line(self, place: complex, other: complex, one: Pin, two: Pin) -> str | None:
         """Return the start of a line for bars that mirror others, and so pass dead points."""
         (first, start), (second, end) = one, two
@@ -331,9 +330,13 @@ class Drawing(Dyads):
         return None
 
 
-def described(robot: Robot, group: Group, others: Sequence[check.Imported]
-              ) -> check.Imported:
-    """Return a mechanism; raise ValueError for loops that are no dyads."""
+def described(robot: Robot, group: Group, others: Sequence[check.Imported],
+              fault: ValueError | None) -> check.Imported:
+    """
+    Return a mechanism; raise ValueError for loops that are no dyads.
+
+    `fault` is why motors do not determine all of them, if they do not.
+    """
     drawing = _drawn(robot, group)
     joints = _joints(drawing) if drawing.drives else []
     if not joints:
@@ -344,14 +347,15 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]
         pose=[float(short(value)) for value in coordinates(drawing.frame)])
     limits, reports = robot.limits(drawing.driven)
     if drawing.left:
-        reports.append(f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.')
-    for drive in drawing.drives:
-        if drive.source in limits:
-            try:
-                parameters[f'{name}.{drive.name}.sweep'] = _sweep(
-                    drive, limits[drive.source], mechanism.inputs[drive.name])
-            except ValueError as error:
-                reports.append(f'Left out: {error}.')
+        reports.append(f'Left out: {", ".join(drawing.left)}: {fault or _why(drawing)}.')
+    for drive in [drive for drive in drawing.drives if drive.source in limits]:
+        ends, settings = limits[drive.source], mechanism.inputs[drive.name]
+        low, high = _sweep(drive, ends, settings)
+        if -scene.MAX_POSITION < low < high - 1e-6 * settings.input.size < scene.MAX_POSITION:
+            parameters[f'{name}.{drive.name}.sweep'] = [low, high]
+        else:
+            reports.append(f'Left out: the limits of {drive.source}, from {ends[0]:.4g} to '
+                           f'{ends[1]:.4g}: its loops do not reach them.')
     slack = drawing.lean + drawing.gap / drawing.size
     if slack > EXACT:
         reports.append(f'Warning: the file is not exact: axes lean by {drawing.lean:.2g} rad, and '
@@ -361,8 +365,8 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]
 
 
 def _sweep(drive: check.Source, limits: tuple[float, float], settings: scene.InputSettings
-           ) -> list[float]:
-    """Return the limits of an input within its reach; raise ValueError if it has no such ends."""
+           ) -> tuple[float, float]:
+    """Return the limits of an input within its reach, no range if they are apart."""
     low, high = (float(short(drive.ratio * end + drive.offset, 1e-15))
                  for end in limits[::1 if drive.ratio > 0.0 else -1])
     for start, end in () if settings.input.is_whole(settings.reach) else settings.reach:
@@ -371,10 +375,7 @@ def _sweep(drive: check.Source, limits: tuple[float, float], settings: scene.Inp
             # An end that is a dead point is not quite reached.
             edge = ROUNDING * (end - start)
             low, high = max(low, start + turns + edge), min(high, end + turns - edge)
-    if not -scene.MAX_POSITION < low < high - 1e-6 * settings.input.size < scene.MAX_POSITION:
-        raise ValueError(f'the limits of {drive.source}, from {limits[0]:.4g} to {limits[1]:.4g}: '
-                         'its loops do not reach them')
-    return [low, high]
+    return low, high
 
 
 def _drawn(robot: Robot, group: Group) -> Drawing:
@@ -407,6 +408,8 @@ def _drawn(robot: Robot, group: Group) -> Drawing:
 
 def _why(drawing: Drawing) -> str:
     """Return why bodies are left."""
+    if not drawing.left:
+        return 'no passive joint of it has a position that moves'
     holders = [joint for joint in drawing.joints if {*joint.bodies} & {*drawing.left}]
     freedom = 3 * len(drawing.left) - 2 * len(holders) - sum(
         joint in drawing.driven for joint in holders)

@@ -47,9 +47,8 @@ class Rods:
         ground = group.ground
         self._seen = np.linalg.inv(robot.frames[ground])
         self._driven = {*robot.driven}
-        # The joint of each link, and its end of a line: its parent, its place and its axis.
-        self.links: dict[str, Joint] = {}
-        self._ends: dict[str, str] = {}
+        # The joint of each link, and the end of its line: its parent, its place and its axis.
+        self.links: dict[str, tuple[Joint, str]] = {}
         self.rods: list[str] = []
         self.drives: list[check.Source] = []
         self._names: set[str] = {*FORMS, 'ground', 'at', 'axis', 'within', 'length'}
@@ -68,8 +67,9 @@ class Rods:
                           if len({*joint.bodies} & self._bodies.keys()) == 1]:
             self._add(reached[0])
         # All others are between a link and a rod or a cylinder.
-        if wrong := [joint.name for joint in joints if joint not in (*self.links.values(), *halves)
-                     and not (apart & {*joint.bodies} and self._bodies.keys() & {*joint.bodies})]:
+        known = [*halves, *(joint for joint, _ in self.links.values())]
+        if wrong := [joint.name for joint in joints if joint not in known and not (
+                apart & {*joint.bodies} and self._bodies.keys() & {*joint.bodies})]:
             raise ValueError('links on hinges and undriven slides can be joined by rods '
                              f'and cylinders, not by {join_names(wrong)}')
         for body, held in rods.items():
@@ -108,8 +108,7 @@ class Rods:
     def _link(self, joint: Joint, base: str, place: np.ndarray, axis: np.ndarray) -> str:
         """Add a link on a joint with another one, and return its name."""
         name = self._named(joint.name)
-        self.links[name] = joint
-        self._ends[name] = f'{base} at {self._text(place)} axis {self._text(axis, False)}'
+        self.links[name] = joint, f'{base} at {self._text(place)} axis {self._text(axis, False)}'
         return name
 
     def _rod(self, name: str, first: str, second: str, way: np.ndarray) -> None:
@@ -155,16 +154,14 @@ class Rods:
     def lines(self, limits: Mapping[str, tuple[float, float]] = {}) -> list[str]:
         """Return the lines, with limits for some other than the file's."""
         lines, motors = [], {drive.name for drive in self.drives}
-        for name, joint in self.links.items():
-            within = ''
-            if name not in motors:
-                # Relative to the pose of the robot.
-                low, high = limits.get(name) or (end - joint.start for end in joint.range)
-                widest = math.inf if joint.kind == SLIDE else _ANY
-                if -widest < low < high < widest:
-                    within = f' within {short(low)} {short(high)}'
+        for name, (joint, end) in self.links.items():
+            # Relative to the pose of the robot.
+            low, high = limits.get(name) or np.subtract(joint.range, joint.start)
+            widest = math.inf if joint.kind == SLIDE else _ANY
+            is_limited = name not in motors and -widest < low < high < widest
+            within = f' within {short(low)} {short(high)}' if is_limited else ''
             word = 'motor' if name in motors else joint.kind
-            lines.append(f'{name} {word} {self._ends[name]}{within}')
+            lines.append(f'{name} {word} {end}{within}')
         return lines + self.rods
 
 
@@ -189,13 +186,13 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> c
         lines = made.lines(error.limits)
         ranges = ', '.join(f'{name} from {low + zero:.4g} to {high + zero:.4g}'
                            for name, (low, high) in error.limits.items()
-                           for zero in [made.links[name].start])
+                           for zero in [made.links[name][0].start])
         angles = ' (angles from the pose of the file)' * (' at ' in error.problem)
         reports.append(f'Limits: {error.problem}{angles}; these are the largest proved to have '
                        f'one pose at most: {ranges}.')
     name, parameters, mechanism = check.mechanism(
         others, f'{made.drives[0].name}_rods', 'rods', lines, made.drives, [
-            (link, 1.0, joint.name, joint.start) for link, joint in made.links.items()
+            (link, 1.0, joint.name, joint.start) for link, (joint, _) in made.links.items()
             if joint.name not in sources and joint.position is not None], frame_id=group.ground)
     for drive, (low, high) in zip(mechanism.inputs.values(), _sweeps(mechanism, limits)):
         parameters[f'{name}.{drive.input.name}.sweep'] = [float(short(low)), float(short(high))]

@@ -160,27 +160,24 @@ class _Model:
                    None if second is None else self._axis(name, second))
         mimic = part.find('axis/mimic')
         if mimic is not None:
-            values = (text(mimic, tag, otherwise) for tag, otherwise in (
-                ('multiplier', '1'), ('reference', '0'), ('offset', '0')))
-            ratio, start, offset = numbers(' '.join(values))
+            ratio, start, offset = numbers([text(mimic, *each) for each in (
+                ('multiplier', '1'), ('reference', '0'), ('offset', '0'))])
             robot.follow(name, self.named(name, mimic.get('joint', '')), ratio,
                          offset - ratio * start)
 
     def _axis(self, name: str, axis: Element | None) -> np.ndarray:
         """Return an axis as the joint's frame has it."""
-        if axis is None:
-            return np.array([0.0, 0.0, 1.0])
-        way, turned = numbers(text(axis, 'xyz', '0 0 1')), self.frame(name)[:3, :3]
-        if seen := attribute(axis, 'xyz', 'expressed_in'):
-            return turned.T @ self.frame(self.named(name, seen))[:3, :3] @ way
-        if text(axis, 'use_parent_model_frame', str(self._is_old).lower()) in ('1', 'true'):
-            return turned.T @ self.frame(name.rpartition('::')[0])[:3, :3] @ way
-        return way
+        axis = Element('axis') if axis is None else axis
+        seen, way = attribute(axis, 'xyz', 'expressed_in'), numbers(text(axis, 'xyz', '0 0 1'))
+        of_model = text(axis, 'use_parent_model_frame', str(self._is_old).lower())
+        if not seen and of_model not in ('1', 'true'):
+            return way
+        base = self.named(name, seen) if seen else name.rpartition('::')[0]
+        return self.frame(name)[:3, :3].T @ self.frame(base)[:3, :3] @ way
 
 
 def _pose(part: Element) -> np.ndarray:
-    if not (values := text(part, 'pose')):
-        return np.eye(4)
+    values = text(part, 'pose', '0 0 0 0 0 0')
     if attribute(part, 'pose', 'rotation_format') == 'quat_xyzw':
         *place, x, y, z, w = numbers(values, 7)
         return at(place, turned_by((w, x, y, z)))

@@ -96,8 +96,8 @@ class Component:
         The greatest distance of two joints in the file's pose [m].
     unit : array
         A radian, or the size, for each screw.
-    positions, named : dict
-        The position in the file, and the screw, of each joint that has one.
+    named : dict
+        The screw of each joint that has a position.
     start : array
         The pose of the file.
     near : float
@@ -109,8 +109,6 @@ class Component:
                  cuts: Sequence[Joint]):
         edges = {tree[body][1] for body in bodies} | {*cuts}
         self.joints = [joint for joint in robot.joints if joint in edges]
-        self.positions = {joint.name: joint.position for joint in self.joints
-                          if joint.position is not None}
         places = np.array([place for joint in self.joints for place in joint.places])
         self.size = float(np.max(np.linalg.norm(places - places[0], axis=1))) or 1.0
         self._up = next((joint.axes[0] for joint in self.joints if joint.kind == HINGE),
@@ -264,20 +262,18 @@ class Component:
             inside &= ~which[i] | (low <= positions[name]) & (positions[name] <= high)
         return inside
 
-    def chosen(self, motions: np.ndarray, names: Sequence[str], first: Sequence[str] = ()
-               ) -> list[str]:
+    def chosen(self, motions: np.ndarray, names: Sequence[str]) -> list[str]:
         """Return joints that tell where all is; ways to move have a column for each screw."""
         basis: list[str] = []
-        for name in sorted(names, key=lambda name: name not in first):
+        for name in names:
             if np.linalg.matrix_rank(motions[:, self.is_of([*basis, name])], 1e-6) > len(basis):
                 basis.append(name)
         return basis
 
     def texts(self, pose: np.ndarray, which: Any) -> dict[str, str]:
         """Return the positions of some screws with names in a pose, each as NAME=VALUE."""
-        positions = self.read(pose[None])
-        return {name: f'{name}={round(float(positions[name][0]), 6) + 0.0:.5g}'
-                for name, i in self.named.items() if which[i]}
+        return {name: f'{name}={round(float(at), 6) + 0.0:.5g}'
+                for name, at in self.read(pose).items() if which[self.named[name]]}
 
     def moves(self, pose: np.ndarray) -> dict[str, np.ndarray]:
         """Return the displacement of each body on its parent in a pose."""
@@ -320,9 +316,9 @@ class Component:
         return [name for name, i in self.named.items() if is_free(motions)[i]], motions
 
     def read(self, poses: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the positions of named joints [rad or m], within half a turn of the file's."""
+        """Return positions of named joints [rad or m], within half a turn of the file's."""
         positions = self._starts + np.where(self._slides, poses, wrapped(poses))
-        return {name: positions[:, i] for name, i in self.named.items()}
+        return {name: positions[..., i] for name, i in self.named.items()}
 
 
 def wrapped(angles: np.ndarray) -> np.ndarray:

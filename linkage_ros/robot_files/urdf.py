@@ -25,9 +25,10 @@ from ..cli import RequestError
 from ..robot_model.robot import at, BALL, FIXED, HINGE, pose, Robot, UNIVERSAL
 from ..words import short_repr, suggestion
 
-# The keys of a file of loops; the last two have no effect.
-_KEYS = ('closures', 'closed_loop', 'pin_loops', 'ball_loops', 'type', 'joint_name',
-         'joint_type', 'independent', 'name_mot', 'dependent', 'ball_limit_deg')
+# The keys of a file of loops that name its motors, and all; the last two have no effect.
+_MOTORS = ('independent', 'name_mot', 'actuated_joints')
+_KEYS = ('closures', 'closed_loop', 'pin_loops', 'ball_loops', 'type', 'joint_name', 'joint_type',
+         'ball_upgrades', *_MOTORS, 'dependent', 'ball_limit_deg')
 _CLOSING = re.compile(r'(?P<name>.*closing_.+)_1')
 
 
@@ -37,9 +38,8 @@ def read(root: Element) -> Robot:
     joints = once((attribute(joint, 'child', 'link'), joint) for joint in root.findall('joint'))
     bases = {child: attribute(joint, 'parent', 'link') for child, joint in joints.items()}
     # Drake's ground needs no link, and a link of its name no joint.
-    grounds = {'world'}.intersection(bases.values())
-    roots = [link for link in {**links, **dict.fromkeys(grounds)}
-             if link not in joints and (link != 'world' or grounds)]
+    grounds = {*links} - {'world'} | {'world'}.intersection(bases.values())
+    roots = [link for link in grounds if link not in joints]
     if len(roots) != 1:
         raise RequestError(f'a URDF has one root link, not {len(roots)}')
     robot = Robot(roots[0], {roots[0]: np.eye(4)})
@@ -56,7 +56,7 @@ def read(root: Element) -> Robot:
             ratio, start = numbers(f'{mimic.get("multiplier", 1)} {mimic.get("offset", 0)}', 2)
             robot.follow(name, mimic.get('joint', ''), ratio, start)
     if 'world' in links and 'world' not in robot.frames:
-        robot.add_body('world', roots[0], [0.0] * 6)
+        robot.add_body('world', robot.root, [0.0] * 6)
     _close_by_elements(robot, root)
     _close_by_frames(robot)
     sdf.join(robot, root.findall('gazebo/joint'))
@@ -90,7 +90,7 @@ def _close_by_elements(robot: Robot, root: Element) -> None:
             # An example of Isaac Sim has an empty end first.
             parts = [part for word in words if (part := cut.find(f'{word}[@link]')) is not None]
             if len(parts) < 2:
-                raise RequestError(f'{tag} {cut.get("name")} has no {" or ".join(words)}')
+                raise RequestError(f'{tag} {cut.get("name")} must have {" and ".join(words)}')
             robot.close(cut.get('name', ''), cut.get('type', ''),
                         (parts[0].attrib['link'], parts[1].attrib['link']),
                         [*map(_origin, parts)], numbers(attribute(cut, 'axis', 'xyz', '0 0 1')))
@@ -140,10 +140,11 @@ def close(robot: Robot, loops: Any) -> None:
             robot.close(str(cut.get('name', f'{key}[{i}]')), kind, (cut['parent'], cut['child']),
                         [at(numbers(cut[f'{end}_xyz'])) for end in ('parent', 'child')],
                         numbers(cut['axis'] if kind == HINGE else '0 0 1'))
-    for name, kind in zip(loops.get('joint_name', ()), loops.get('joint_type', ())):
+    for name, kind in (*zip(loops.get('joint_name', ()), loops.get('joint_type', ())),
+                       *((name, BALL) for name in loops.get('ball_upgrades', ()))):
         _change(robot, name, str(kind).lower())
     # Its motors are those of the closed robot, transmissions those of the open tree.
-    motors = [*loops.get('independent', ()), *loops.get('name_mot', ())]
+    motors = [name for key in _MOTORS for name in loops.get(key, ())]
     robot.check_names(motors)
     robot.driven = motors or robot.driven
 
@@ -155,9 +156,8 @@ def _change(robot: Robot, name: str, kind: str) -> None:
         # The URDF still has it, so that its position is published.
         robot.held[name] = joint.position
         return
-    frame = robot.frames[joint.bodies[1]]
     first, second = (np.eye(3)['xyz'.index(axis)] for axis in kind[-2:]) \
-        if kind.startswith('ujoint') else (frame[:3, :3].T @ joint.axes[0], None)
+        if kind.startswith('ujoint') else (np.eye(3)[2], None)
     robot.joints.remove(joint)
-    robot.join(name, kind if second is None else UNIVERSAL, joint.bodies, frame, first,
-               second=second)
+    robot.join(name, kind if second is None else UNIVERSAL, joint.bodies,
+               robot.frames[joint.bodies[1]], first, second=second)

@@ -80,10 +80,9 @@ def robot(mechanisms: Iterable[SceneMechanism], frame_id: str,
         simulators has no pose.
 
     """
-    trees = [(mechanism, _Tree(mechanism, mechanism.frame_id or frame_id, width).robot)
+    trees = [_Tree(mechanism, mechanism.frame_id or frame_id, width, density)
              for mechanism in mechanisms]
-    made = merged([_started(*tree, density) if density else tree[1] for tree in trees])
-    return replace(made, density=density)
+    return replace(merged([tree.robot for tree in trees]), density=density)
 
 
 def merged(robots: Sequence[Robot]) -> Robot:
@@ -131,7 +130,7 @@ def size(mechanism: SceneMechanism) -> float:
 class _Tree:
     """The bodies of a mechanism: ground, the root, crank and legs, in `robot`."""
 
-    def __init__(self, mechanism: SceneMechanism, base: str, width: float | None):
+    def __init__(self, mechanism: SceneMechanism, base: str, width: float | None, density: float):
         mechanism.check_planar()
         length = size(mechanism)
         self._length = length if width is None else width / WIDTH
@@ -139,7 +138,8 @@ class _Tree:
         self._mechanism, legs = mechanism, mechanism.assembly().legs
         self._shapes = shapes.shapes(mechanism)
         self._frames = {GROUND: shapes.ground_frame(mechanism.linkage), **mechanism.linkage.frames}
-        self._travels = travels(mechanism)
+        self._travels = {name: settings.sweep for name, settings in mechanism.inputs.items()
+                         if settings.sweep} if density else travels(mechanism)
         ground = self._body('', GROUND)
         self.robot = Robot(base, {base: np.eye(4)}, pieces={ground: []},
                            stands={ground: mechanism.pose}, name=mechanism.name)
@@ -150,6 +150,8 @@ class _Tree:
             self.robot.pieces[self._body('', self._shared.name)] = [self._ball]
         for prefix, leg in legs.items():
             self._add_leg(prefix, leg)
+        if density:
+            self.robot = _started(mechanism, self.robot, density)
 
     def _add_leg(self, prefix: str, leg: Leg) -> None:
         robot, ends = self.robot, Counter[str]()
@@ -269,9 +271,6 @@ def _started(mechanism: SceneMechanism, part: Robot, density: float) -> Robot:
         joint, arm = joints[name], mechanism.scale * math.hypot(*linkage.frames[name][tips[name]])
         robot.driven.append(joint.name)
         robot.servos[joint.name] = mass, arm or size(mechanism)
-    sweeps = {joints[name].name: tuple(sorted(map(joints[name].of, settings.sweep)))
-              for name, settings in inputs.items() if settings.sweep}
-    robot.joints = [replace(joint, limits=sweeps.get(joint.name)) for joint in robot.joints]
     for by, driving in enumerate(inputs):
         for prefix, name in product(assembly.legs, linkage.geared_to(by)):
             geared, other = joints[prefix + name], joints[driving]

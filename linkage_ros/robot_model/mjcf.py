@@ -41,17 +41,16 @@ def write(robot: Robot) -> str:
     bodies = {body.name: body for body in robot.bodies()}
     for body in bodies.values():
         elements[body.name] = _add_body(elements[body.parent], body, robot)
-    joints = {joint.name: joint for joint in robot.joints}
     for cut, met in robot.meets.items():
         add(equality, 'connect', name=cut, body1=bodies[met].parent, body2=bodies[cut].parent,
             anchor=bodies[met].pose[:3])
     for name in robot.follows:
         other, ratio, offset = robot.changes(name)
         add(equality, 'joint', joint1=name, joint2=other, polycoef=(offset, ratio, 0, 0, 0))
-    for name in robot.driven:
-        _add_motor(actuator, joints[name], robot)
-    starts = [robot.positions[name] for name in robot.driven]
-    add(add(root, 'keyframe'), 'key', name='start', ctrl=starts)
+    motors = [joint for name in robot.driven for joint in robot.joints if joint.name == name]
+    for joint in motors:
+        _add_motor(actuator, joint, robot)
+    add(add(root, 'keyframe'), 'key', name='start', ctrl=[joint.start for joint in motors])
     indent(root)
     return tostring(root, encoding='unicode')
 

@@ -37,12 +37,9 @@ def at(place: Any, turned: Any = ((1, 0, 0), (0, 1, 0), (0, 0, 1))) -> np.ndarra
 
 def pose(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> np.ndarray:
     """Return a pose as a matrix (4, 4), by its place [m] and its angles about fixed axes [rad]."""
-    (cr, cp, cy), (sr, sp, sy) = map(math.cos, (roll, pitch, yaw)), map(math.sin, (
-        roll, pitch, yaw))
-    return np.array([
-        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, x],
-        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, y],
-        [-sp, cp * sr, cp * cr, z], [0.0, 0.0, 0.0, 1.0]])
+    about_x, about_y, about_z = exponentials(screws(np.eye(3), np.zeros(3)), np.array([
+        roll, pitch, yaw]))
+    return at((x, y, z), (about_z @ about_y @ about_x)[:3, :3])
 
 
 def turned_by(quaternion: Any) -> np.ndarray:
@@ -419,13 +416,11 @@ def with_positions(robot: Robot, values: Mapping[str, float],
             screw = screws(joint.motion(body), joint.place(base), slides)
             step = exponentials(screw, change, slides)
         moved[body] = moved[base] @ step
-    joints = []
-    for joint in robot.joints:
-        turned, shifted = zip(*((moved[body][:3, :3], moved[body][:3, 3])
-                                for body in joint.bodies))
-        joints.append(replace(
-            joint, places=tuple(map(np.add, map(np.matmul, turned, joint.places), shifted)),
-            axes=tuple(map(np.matmul, turned, joint.axes)),
-            position=None if joint.position is None else values.get(joint.name, joint.position)))
+    joints = [replace(
+        joint, places=[(moved[body] @ [*place, 1.0])[:3]
+                       for body, place in zip(joint.bodies, joint.places)],
+        axes=[moved[body][:3, :3] @ axis for body, axis in zip(joint.bodies, joint.axes)],
+        position=None if joint.position is None else values.get(joint.name, joint.position))
+        for joint in robot.joints]
     return replace(robot, joints=joints, frames={
         body: moved[body] @ frame for body, frame in robot.frames.items()})

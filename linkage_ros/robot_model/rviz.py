@@ -38,10 +38,9 @@ def adapted(config: dict, mechanisms: Mapping[str, SceneMechanism], frame_id: st
     displays = manager['Displays']
     places = [i for i, display in enumerate(displays) if display['Class'] == GROUP]
     text, topics = json.dumps(displays[places[0]]), f'/{namespace.strip("/")}/'.replace('//', '/')
-    groups = [json.loads(text.replace(f'"/{displays[places[0]]["Name"]}/', f'"{topics}{name}/'))
+    own = f'"/{displays[places[0]]["Name"]}/'
+    groups = [{**json.loads(text.replace(own, f'"{topics}{name}/')), 'Name': name}
               for name in mechanisms]
-    for name, group in zip(mechanisms, groups):
-        group['Name'] = name
     displays[places[0]:places[-1] + 1] = groups
     manager['Global Options']['Fixed Frame'] = frame_id
     manager['Views']['Current'].update(_camera(mechanisms.values()))

@@ -68,11 +68,11 @@ def _add_body(made: Element, robot: Robot, body: Body) -> None:
                     (body.parent, body.parent))
     link = add(made, 'link', name=body.name)
     add(link, 'pose', body.pose, relative_to=base)
-    if pieces := robot.pieces.get(body.name):
+    if pieces := robot.pieces.get(body.name, ()):
         mass, centre, moments = weight(pieces, robot.density)
         inertial = _fill(add(link, 'inertial'), pose=(*centre, 0.0, 0.0, 0.0, 0.0), mass=mass)
         _fill(add(inertial, 'inertia'), **dict(zip(('ixx', 'iyy', 'izz', 'ixy'), moments)))
-    for i, piece in enumerate(pieces or ()):
+    for i, piece in enumerate(pieces):
         visual = _fill(add(link, 'visual', name=f'{body.name}_{i}'), pose=piece.pose)
         _fill(add(add(visual, 'geometry'), piece.shape), **piece.sizes)
         colour = COLOURS[piece.colour]

@@ -12,7 +12,7 @@ Format: the URDF XML specification of ROS (wiki.ros.org/urdf/XML).
 
 from __future__ import annotations
 
-from typing import Iterable, Sequence
+from typing import Iterable
 from xml.etree.ElementTree import Element, indent, tostring
 
 import numpy as np
@@ -50,7 +50,7 @@ def _add_link(root: Element, body: Body, pieces: Iterable[Piece]) -> None:
     joint = add(root, 'joint', name=f'{body.name}_fixed', type='fixed')
     add(joint, 'parent', link=body.parent)
     add(joint, 'child', link=body.name)
-    _add_origin(joint, body.pose)
+    add(joint, 'origin', xyz=body.pose[:3], rpy=body.pose[3:])
     if moving := body.joint:
         turns, limits = moving.kind == HINGE, moving.limits
         joint.set('name', moving.name)
@@ -62,11 +62,6 @@ def _add_link(root: Element, body: Body, pieces: Iterable[Piece]) -> None:
     link = add(root, 'link', name=body.name)
     for piece in pieces:
         visual = add(link, 'visual')
-        _add_origin(visual, piece.pose)
+        add(visual, 'origin', xyz=piece.pose[:3], rpy=piece.pose[3:])
         add(add(visual, 'geometry'), piece.shape, **piece.sizes)
         add(visual, 'material', name=piece.colour)
-
-
-def _add_origin(element: Element, pose: Sequence[float]) -> None:
-    if any(pose):
-        add(element, 'origin', xyz=pose[:3], rpy=pose[3:])
