@@ -352,12 +352,15 @@ static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_rea
 }
 
 /* Correct the inputs of p to those of positions next to its own, with their pose, see lkr_model.at;
-   returns the number of poses, 0 if there are none. One step of Newton's method is enough: it squares
-   what is left. */
+   returns 0 if there are none, 1 if they are its own, else 2. One step of Newton's method is enough:
+   it squares what is left, but next to an extreme, where what is left may be rounding. */
 static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *position,
     int has_rates, lkr_point *p)
 {
+    lkr_real best[LKR_MAX_INPUTS];
     lkr_real step[LKR_MAX_INPUTS] = { 0 };
+    lkr_real least = LKR_OTHER;
+    int is_rounding = 0;
     int i, poses;
     for (poses = 1; poses <= 2; poses++) {
         lkr_real left;
@@ -368,15 +371,21 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
         if (left <= LKR_ENOUGH) {
             return poses;
         }
-        has_rates = has_rates || model->at(1, p);
-        if (lkr_is_rounding(model, side, position, p, left)) {
-            return poses;
+        if (!(left < least)) {
+            break;
         }
-        if (!(left < LKR_OTHER) || !lkr_solve(model, side, p, 0, step)) {
-            return 0;
+        least = left;
+        memcpy(best, p->q, sizeof best);
+        has_rates = has_rates || model->at(1, p);
+        is_rounding = lkr_is_rounding(model, side, position, p, left);
+        if (poses == 2 || !lkr_solve(model, side, p, 0, step)) {
+            break;
         }
     }
-    return 0;
+    if (is_rounding) {
+        memcpy(p->q, best, sizeof best);
+    }
+    return 2 * is_rounding;
 }
 
 /* The pose of positions whose inputs are nearest to some, see lkr_model.at; returns 0 if there is
