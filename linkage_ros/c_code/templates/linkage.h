@@ -139,9 +139,9 @@ typedef struct {
     lkr_real load[LKR_MAX_INPUTS];
 } lkr_point;
 
-/* An actuator or a joint: it is at factor * output + offset. */
+/* An actuator or a joint: its output in the scene is ratio * (position - offset). */
 typedef struct {
-    lkr_real factor, offset;
+    lkr_real ratio, offset;
     /* One over the size of the position, and what it may change by without effect, or INFINITY. */
     lkr_real scale, turn;
 } lkr_axis;
@@ -381,7 +381,7 @@ static inline int lkr_find(const lkr_model *model, int side, const lkr_real *pos
     int count, i, k;
     for (i = 0; i < model->inputs; i++) {
         const lkr_axis *axis = &model->axis[side][i];
-        value[i] = (position[i] - axis->offset) / axis->factor;
+        value[i] = axis->ratio * (position[i] - axis->offset);
         near[i] = lkr_clamped(from[i], model->input[i].low, model->input[i].high);
     }
     count = model->solutions[side](value, q);
