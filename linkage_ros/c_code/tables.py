@@ -71,9 +71,8 @@ class Tables:
             'values': indented(self._values(rows)),
             'sum': ' + '.join(f'p->position[{side}][{i}]' for side, axes in enumerate(sides)
                               for i in range(len(axes))),
-            'axes': row(row((1.0 / axis.factor, axis.offset, 1.0 / axis.size, axis.turn or math.inf)
-                            for axis in axes) if axes else '{ { 0, 0, 0, 0 } }'
-                           for axes in rows),
+            'axes': row(row((1.0 / x.factor, x.offset, 1.0 / x.size, x.turn or math.inf)
+                            for x in axes) if axes else '{ { 0, 0, 0, 0 } }' for axes in rows),
             'rows': row(self._inputs(sides)),
             'start': row(start(self.mechanism))})
 
