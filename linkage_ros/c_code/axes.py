@@ -41,11 +41,11 @@ def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float =
     linkage = mechanism.linkage
     is_angle = linkage.is_angle(output)
     factor *= mechanism.scale_of(output)
-    counted = next((i for i, input_ in enumerate(linkage.inputs)
-                    if output in (input_.name, *linkage.geared_to(i))), None)
-    turns = is_angle and counted is None
+    index = next((i for i, input_ in enumerate(linkage.inputs)
+                  if output in (input_.name, *linkage.geared_to(i))), None)
+    turns = is_angle and index is None
     return Axis(name, output, factor, offset, abs(factor) * (1.0 if is_angle else linkage.longest),
-                abs(factor) * math.tau * turns, wraps and turns, output, counted)
+                abs(factor) * math.tau * turns, wraps and turns, output, index)
 
 
 def actuators(mechanism: SceneMechanism) -> list[Axis]:

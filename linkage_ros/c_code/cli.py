@@ -23,7 +23,7 @@ def show(args: list[str] | None) -> None:
     options = arguments().parse_args(args)
     mechanisms = cli.chosen(scene.load(options.scene).mechanisms, options.mechanism)
     try:
-        print(header.printed([header.Request(mechanism, options.output, own) for mechanism, own
+        print(header.printed([header.Request(mechanism, options.output, names) for mechanism, names
                               in with_joints(mechanisms, options.joints)], options.float))
     except ValueError as error:
         raise cli.RequestError(str(error)) from None

@@ -54,26 +54,26 @@ class Formulas:
 
     def function(self) -> str:
         """Return the function for all fields and their rates."""
-        structure, groups = self._linkage.formulas, [*self._groups()]
+        formulas, groups = self._linkage.formulas, [*self._groups()]
         name, scales, number = self._mechanism.name, self._mechanism.scales, self._code.number
         # No word of C and no macro ends so.
         inputs = [f'{name}_' for name in self._mechanism.inputs]
         poses = [(f'/* {comment(about)} */', self._assigned(
-            outputs, {'p->': 1.0}, map(structure.output, outputs))) for about, outputs in groups]
+            outputs, {'p->': 1.0}, map(formulas.output, outputs))) for about, outputs in groups]
         rates = [(f'/* Rates of {comment(about)} */', self._assigned(
             outputs, {f'by[{i}].': scale for i, scale in enumerate(scales)},
-            structure.parts(((), (), tuple(outputs))))) for about, outputs in groups]
+            formulas.parts(((), (), tuple(outputs))))) for about, outputs in groups]
         # An input without a value has no pose.
         valid = sum(map(argument, range(len(inputs))), real(0.0))
         # If it can be assembled at any input, rounding does not matter.
         if len(inputs) > 1 or not self._linkage.inputs[0].is_whole(self._linkage.reach()):
-            valid = structure.where_assembled(valid)
-        parameters = ', '.join(f'{number} {each}' for each in inputs)
+            valid = formulas.where_assembled(valid)
+        parameters = ', '.join(f'{number} {x}' for x in inputs)
         return self._code.function(
             '/* The pose and, with has_rates, its rates by each input; returns 0 if there is none.'
             f' */\nLKR_FORMULA int {name}_solve({parameters}, int has_rates,\n'
             f'    {name}_pose *p, {name}_pose *by)',
-            [self._code.times(each, 1.0 / scale) for each, scale in zip(inputs, scales)],
+            [self._code.times(x, 1.0 / scale) for x, scale in zip(inputs, scales)],
             [*poses, ('', {f'const {number} valid': valid}),
              ('if (!has_rates) {\n    return isfinite(valid);\n}', {}), *rates],
             'return isfinite(valid);')

@@ -72,10 +72,10 @@ def printed(requests: Sequence[Request], single: bool = False) -> str:
 def headers(requests: Sequence[Request], single: bool, common: Sequence[str]) -> list[str]:
     """Return the headers of mechanisms in one program, each with a text of `common`."""
     values = [_values(request, single) for request in requests]
-    sizes = {size: max(each[f'own_{size}'] for each in values)
+    sizes = {size: max(fields[f'own_{size}'] for fields in values)
              for size in ('inputs', 'joints', 'solutions')}
-    return [filled(template('mechanism.h.in'), {**each, **sizes, 'common': text})
-            for each, text in zip(values, common)]
+    return [filled(template('mechanism.h.in'), {**fields, **sizes, 'common': text})
+            for fields, text in zip(values, common)]
 
 
 def _values(request: Request, single: bool) -> dict[str, Any]:
@@ -85,7 +85,7 @@ def _values(request: Request, single: bool) -> dict[str, Any]:
     sides = actuators(mechanism), joints(mechanism, request.joints)
     inverses = _inverses(mechanism, request.outputs)
     formulas = Formulas(mechanism, code, [
-        *(each.output for axes in (*sides, *inverses.values()) for each in axes),
+        *(axis.output for axes in (*sides, *inverses.values()) for axis in axes),
         *(output for output, _ in loads(mechanism))])
     tables = Tables(mechanism, code, formulas)
     what, where = (_with_units(linkage, axes) for axes in sides)
@@ -115,7 +115,7 @@ def _inverses(mechanism: SceneMechanism, texts: Sequence[str]) -> dict[str, list
     groups = [invertible(mechanism, [axis(mechanism, output, output)
                                      for output in outputs[i:i + n]])
               for i in range(0, len(outputs), n)]
-    return dict(zip(distinct('_'.join(field(mechanism.linkage, each.output) for each in axes)
+    return dict(zip(distinct('_'.join(field(mechanism.linkage, x.output) for x in axes)
                              for axes in groups), groups))
 
 
@@ -133,5 +133,5 @@ def _about(mechanism: SceneMechanism) -> Iterator[str]:
 
 
 def _with_units(linkage: Mechanism, axes: Sequence[Axis]) -> str:
-    return ', '.join(f'{each.name} [{"rad" if linkage.is_angle(each.output) else "m"}]'
-                     for each in axes)
+    return ', '.join(f'{axis.name} [{"rad" if linkage.is_angle(axis.output) else "m"}]'
+                     for axis in axes)

@@ -21,8 +21,8 @@ SAMPLES = 200_000
 def lines(mechanism: SceneMechanism, names: Sequence[str] = ()) -> Iterator[str]:
     """Yield each commanded joint with its limits as an element of a URDF; see `axes.joints`."""
     for axis in joints(mechanism, names):
-        found = ends(mechanism, axis)
-        limit = f'<limit lower="{found[0]!r}" upper="{found[1]!r}"/>' if found else \
+        limits = ends(mechanism, axis)
+        limit = f'<limit lower="{limits[0]!r}" upper="{limits[1]!r}"/>' if limits else \
             '<!-- it turns without an end: continuous -->'
         yield f'<joint name={quoteattr(axis.name)}>{limit}</joint>'
 
@@ -54,16 +54,16 @@ def ends(mechanism: SceneMechanism, axis: Axis) -> tuple[float, float] | None:
         settings.ends for settings in inputs.values())
     if turns and high - low >= math.tau * abs(axis.factor) * (1.0 - 1e-9):
         return None
-    away = axis.turn and axis.turn * round(0.5 * (low + high) / axis.turn)
-    return low - away, high - away
+    shift = axis.turn and axis.turn * round(0.5 * (low + high) / axis.turn)
+    return low - shift, high - shift
 
 
 def _values(mechanism: SceneMechanism, axis: Axis, arcs: Sequence[np.ndarray]) -> np.ndarray:
     """Return an output at the start and at many poses, the corners of the sweeps among them."""
     linkage, rng = mechanism.linkage, np.random.default_rng(1)
     parts = rng.uniform(-0.1, 1.1, (len(arcs), SAMPLES)).clip(0.0, 1.0)
-    inputs = [np.append(first, own.min() + part * np.ptp(own))
-              for first, part, own in zip(start(mechanism), parts, arcs)]
+    inputs = [np.append(first, arc.min() + part * np.ptp(arc))
+              for first, part, arc in zip(start(mechanism), parts, arcs)]
     values = linkage.joint_angles(inputs, [axis.output])[axis.output]
     first = values[np.isfinite(values).argmax()]
     return first + np.remainder(values - first + math.pi, math.tau) - math.pi if axis.turn \

@@ -44,20 +44,20 @@ def series(linkage: Mechanism, output: str, parts: np.ndarray, single: bool,
     powers = np.column_stack([np.pad(chebyshev.cheb2poly(row), (0, terms - 1 - i))
                               for i, row in enumerate(np.eye(terms))])
     # Ever denser towards both ends.
-    checked = np.tanh(np.linspace(-18.0, 18.0, 129))
+    samples = np.tanh(np.linspace(-18.0, 18.0, 129))
 
     def passed(inputs: np.ndarray, end: np.ndarray, change: np.ndarray) -> np.ndarray:
         """Return which parts of a change from an end the output has behind it."""
-        gap = pose.over(unit * inputs)[0] - end
-        return (gap - is_angle * math.tau * np.round((gap - 0.5 * change) / math.tau)) / change
+        ahead = pose.over(unit * inputs)[0] - end
+        return (ahead - is_angle * math.tau * np.round((ahead - 0.5 * change) / math.tau)) / change
 
-    def halved(wanted: np.ndarray, start: np.ndarray, stop: np.ndarray, *change: np.ndarray
+    def halved(target: np.ndarray, start: np.ndarray, stop: np.ndarray, *change: np.ndarray
                ) -> np.ndarray:
-        """Return where parts are wanted ones, by halving."""
-        below, above = np.full_like(wanted, start), np.full_like(wanted, stop)
+        """Return where parts are those of a target, by halving."""
+        below, above = np.full_like(target, start), np.full_like(target, stop)
         for _ in range(HALVINGS):
             inputs = 0.5 * (below + above)
-            is_below = passed(inputs, *change) < wanted
+            is_below = passed(inputs, *change) < target
             below, above = np.where(is_below, inputs, below), np.where(is_below, above, inputs)
         return below
 
@@ -81,12 +81,12 @@ def series(linkage: Mechanism, output: str, parts: np.ndarray, single: bool,
         bounds = np.sort(halved(squares, start, cut, end, change))
         fitted = powers @ chebyshev.chebfit(nodes, halved(
             (center + half * nodes) ** 2, start, cut, end, change).T, terms - 1)
-        inputs = polynomial.polyval(checked, fitted).clip(
+        inputs = polynomial.polyval(samples, fitted).clip(
             np.minimum(start, cut), np.maximum(start, cut))
         reached = passed(inputs, end, change)
-        missed, digit = (np.abs(others - reached).max(axis=1, keepdims=True) for others in (
-            (center + half * checked) ** 2, passed(np.nextafter(inputs, cut), end, change)))
-        is_done = ((missed <= np.maximum(CLOSE[single] * size / np.abs(change), DIGITS * digit))
+        residual, digit = (np.abs(others - reached).max(axis=1, keepdims=True) for others in (
+            (center + half * samples) ** 2, passed(np.nextafter(inputs, cut), end, change)))
+        is_done = ((residual <= np.maximum(CLOSE[single] * size / np.abs(change), DIGITS * digit))
                    | (np.diff(bounds) < SHORTEST))[:, 0]
         middle = change * squares.mean(axis=1, keepdims=True)
         steepness = 1.0 / (change * half * half)

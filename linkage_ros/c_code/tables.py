@@ -103,11 +103,11 @@ class Tables:
 
     def _inputs(self, sides: Sequence[Sequence[Axis]]) -> Iterator[tuple]:
         """Yield the rows of the inputs, as `lkr_input` has them."""
-        counted = [{axis.input for axis in axes} for axes in sides]
+        indices = [{axis.input for axis in axes} for axes in sides]
         for i, settings in enumerate(self.mechanism.inputs.values()):
             input_, sweep = self.linkage.inputs[i], sides[0] and settings.ends
             turns = [input_.turn if input_.wraps and i not in inputs else math.inf
-                     for inputs in counted]
+                     for inputs in indices]
             size = self.mechanism.scales[i] * input_.size
             yield size, 1.0 / size, *(sweep or ('-LKR_ENDLESS', 'LKR_ENDLESS')), turns
 
@@ -121,16 +121,16 @@ class Tables:
         if outputs not in self.solutions:
             name = '_'.join([f'{self.mechanism.name}_solutions', *(
                 self._formulas.fields[output] for output in outputs)])
-            *_, name = distinct([*(known for known, *_ in self.solutions.values()), name])
+            *_, name = distinct([*(other for other, *_ in self.solutions.values()), name])
             head = (f'static inline int {name}(const lkr_real *value,\n'
                     '    lkr_real (*q)[LKR_MAX_INPUTS])')
-            counted = {axis.input: (argument(i) - shift) / ratio
-                       for i, axis in enumerate(axes) if axis.input is not None
-                       for ratio, shift in [self.linkage.gear(axis.output, axis.input)]}
-            if len(counted) == len(axes):
-                made = self._function(f'/* The inputs. */\n{head}', [('', counted)])
+            known_inputs = {axis.input: (argument(i) - shift) / ratio
+                            for i, axis in enumerate(axes) if axis.input is not None
+                            for ratio, shift in [self.linkage.gear(axis.output, axis.input)]}
+            if len(known_inputs) == len(axes):
+                made = self._function(f'/* The inputs. */\n{head}', [('', known_inputs)])
             elif closed := self.linkage.inverse(outputs).closed:
-                made = self._closed(head, outputs, counted, closed)
+                made = self._closed(head, outputs, known_inputs, closed)
             else:
                 made = self._series(head, outputs[0])
             self.solutions[outputs] = name, *made
@@ -146,23 +146,23 @@ class Tables:
             # Where two pieces of a monotone part meet, both have the input.
             f'/* The inputs of an output, in each of {n} pieces of the reach. */',
             head, '{', f'    static const lkr_piece piece[{n}] LKR_IN_FLASH = {{',
-            indented(f'    {row([*each[:7], each[7:]])},' for each in pieces.tolist()), '    };',
+            indented(f'    {row([*x[:7], x[7:]])},' for x in pieces.tolist()), '    };',
             f'    return lkr_series({n}, piece, '
             f'{self._code.literal(1.0 if is_angle else linkage.longest)}, '
             f'{self._code.literal(math.tau if is_angle else math.inf)}, *value, q);', '}'])
 
-    def _closed(self, head: str, outputs: Sequence[str], counted: Mapping[int, Real],
+    def _closed(self, head: str, outputs: Sequence[str], known_inputs: Mapping[int, Real],
                 closed: InverseLinkage) -> tuple[int, str]:
         """Return the number of solutions of an inverse linkage, and the function for them."""
         candidates, solutions = closed.solutions(), []
         for (signs, turns), inputs in zip(
                 product(closed.modes, product(*closed.turns)), candidates):
             # If an input has a period of several turns, each turn has its own pose.
-            if not any(turns[i] for i in counted):
+            if not any(turns[i] for i in known_inputs):
                 sides = ', '.join(f'{joint} {"left" if sign > 0.0 else "right"}'
                                   for joint, sign in zip(closed.branches, signs))
                 solutions.append((f'/* {sides} */' if sides and not any(turns) else '', {
-                    i: counted.get(i, value) for i, value in enumerate(inputs)}))
+                    i: known_inputs.get(i, value) for i, value in enumerate(inputs)}))
         if len(outputs) == 1:
             solutions = [solutions[k] for k in self._in_reach(outputs[0], candidates)] or solutions
         lines = '\n     '.join(map(comment, closed.lines))
@@ -184,7 +184,7 @@ class Tables:
         steps, linkage = (np.arange(SAMPLES) + 0.382) / SAMPLES, self.linkage
         low, high = linkage.monotone(output).T[:2, :, None]
         inputs = (low + steps * (high - low)).ravel()
-        found = linkage.bind(Program([x for x, in solutions])).over(
+        solved = linkage.bind(Program([x for x, in solutions])).over(
             *linkage.compiled_pose((), (output,)).over(inputs))
-        apart = linkage.inputs[0].distance(found, inputs)
-        return sorted({*np.where(np.isfinite(apart), apart, math.inf).argmin(axis=0).tolist()})
+        error = linkage.inputs[0].distance(solved, inputs)
+        return sorted({*np.where(np.isfinite(error), error, math.inf).argmin(axis=0).tolist()})

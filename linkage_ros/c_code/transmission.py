@@ -26,7 +26,7 @@ def write(args: list[str] | None) -> None:
     try:
         mechanisms = with_joints(chosen, options.joints)
         if options.limits:
-            print('\n'.join(line for each in mechanisms for line in limits.lines(*each)))
+            print('\n'.join(line for request in mechanisms for line in limits.lines(*request)))
             return
         out = Path(options.out).absolute()
         files = package(out.name, Path(options.scene).name, mechanisms)

@@ -175,7 +175,7 @@ class Dyads:
         """Return an angle [rad] as 0 to 3 quarter turns; None if the line has the angle itself."""
         return None
 
-    def special_line(self, place: complex, other: complex, first: Pin, second: Pin) -> str | None:
+    def special_line(self, place: complex, other: complex, *pins: Pin) -> str | None:
         """Return a more specific line than `dyad` for two bars, or None."""
         return None
 

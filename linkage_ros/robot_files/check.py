@@ -90,12 +90,12 @@ class Walk(NamedTuple):
     """
     Positions along paths (paths, steps), and how far loops stand open there [m].
 
-    A gap is NaN where there is no pose. `joints` has the sources, too; `poses` are those of each
+    An opening is NaN where there is no pose. `joints` has the sources, too; `poses` are those of each
     step. `good` tells where the loops are closed on all of the way.
     """
 
     joints: dict[str, np.ndarray]
-    gaps: np.ndarray
+    openings: np.ndarray
     poses: list[np.ndarray]
     good: np.ndarray
 
@@ -161,9 +161,9 @@ class _Loops:
         moved = ', '.join(
             f'{source} from {min(values):.4g} to {max(values):.4g}' for source in self._ends
             for values in [[self._start[source], *walk.joints[source][walk.good]]])
-        names, gaps = ', '.join(made.name for made in self._parts), walk.gaps[walk.good]
-        return (f'Checked: {names}: in {gaps.size} poses of the robot, {moved}, its loops stand '
-                f'open by {gaps.max():.0e} m at most{beyond}.')
+        names, openings = ', '.join(made.name for made in self._parts), walk.openings[walk.good]
+        return (f'Checked: {names}: in {openings.size} poses of the robot, {moved}, its loops '
+                f'stand open by {openings.max():.0e} m at most{beyond}.')
 
     def _check_start(self) -> None:
         """Raise Difference if a joint is not where the file has it."""
@@ -219,10 +219,10 @@ class _Loops:
             pose = pose if fixed.all() else component.closed(pose, fixed)
             poses.append(pose)
         errors = np.abs(component.errors(np.concatenate(poses))[0] - self._misfit)
-        gaps = np.column_stack(np.split(errors.max(axis=1), steps))
-        gaps[isnan] = math.nan
-        return Walk({**sources, **joints}, gaps, poses,
-                    np.logical_and.accumulate(gaps <= self._allowed, axis=1))
+        openings = np.column_stack(np.split(errors.max(axis=1), steps))
+        openings[isnan] = math.nan
+        return Walk({**sources, **joints}, openings, poses,
+                    np.logical_and.accumulate(openings <= self._allowed, axis=1))
 
     def _positions(self, sources: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Return positions of the loops' joints along paths."""
@@ -244,9 +244,9 @@ class _Loops:
         a step from the last pose on the path. Past a change point a robot can continue in two
         ways.
         """
-        component, gap = self._component, float(walk.gaps[path, step])
+        component, opening = self._component, float(walk.openings[path, step])
         poses = [component.start, *(pose[[path]] for pose in walk.poses[:step])]
-        if math.isnan(gap) or not component.is_of([*walk.joints]).all():
+        if math.isnan(opening) or not component.is_of([*walk.joints]).all():
             motors = {name: walk.joints[name][path, [step]] for name in self._motors}
             fixed = component.is_of([*motors])
             new = component.closed(component.moved_to(poses[-1], motors), fixed, 40)
@@ -256,8 +256,8 @@ class _Loops:
                 return
         raise Difference(self._at({name: values[path, step] for name, values in
                                    walk.joints.items()}) + (
-            ' it has no pose, where the loops of the robot are closed' if math.isnan(gap) else
-            f' its loops stand open by {gap:.2g} m'))
+            ' it has no pose, where the loops of the robot are closed' if math.isnan(opening) else
+            f' its loops stand open by {opening:.2g} m'))
 
     def _at(self, values: Mapping[str, float]) -> str:
         return 'with ' + ', '.join(f'{source} at {values[source]:.4g}' for source in self._ends)

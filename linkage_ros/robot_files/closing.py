@@ -17,10 +17,10 @@ from .spatial import ASKEW, Component, components, DEAD_POINT, is_free
 from ..robot_model.robot import FIXED, NotDriven, Robot, with_positions
 from ..words import join_names
 
-# A gap that is smaller, of the size of its loops, is rounding: files have angles such as 1.5708.
+# An opening that is smaller, of the size of its loops, is rounding: files have angles such as 1.5708.
 # Such loops are closed without a search, as far as they can be.
 NEAR = 1e-3
-# Loops with a larger gap, of their size, are open: files have rounded numbers.
+# Loops with a larger opening, of their size, are open: files have rounded numbers.
 OPEN = 1e-4
 # Number of random starts of a search for closed poses, less where that many screws take long.
 STARTS, SCREWS = 96, 1400
@@ -106,11 +106,11 @@ def _closed(robot: Robot, seed: int) -> Closed:
             made.report.extend([report] * bool(report))
             moves.update(component.moves(pose))
             positions.update((name, float(at)) for name, at in component.read(pose).items())
-            apart = np.linalg.norm(component.errors(pose[None])[0].reshape(-1, 3), axis=1).max()
-            if apart > LEANING * component.size:
-                raise ValueError(f'its loops cannot be closed: they stay open by {apart:.3g} m, '
+            opening = np.linalg.norm(component.errors(pose[None])[0].reshape(-1, 3), axis=1).max()
+            if opening > LEANING * component.size:
+                raise ValueError(f'its loops cannot be closed: they stay open by {opening:.3g} m, '
                                  f'more than {OPEN:g} of their size')
-            if component.gap(pose[None])[0] < component.near:
+            if component.residual(pose[None])[0] < component.near:
                 _check_driven(component, pose, motors, followers)
         except ValueError as error:
             made.faults.update((joint.name, error) for joint in component.joints)
@@ -126,7 +126,7 @@ def _added(*options: tuple[str, Iterable[str]]) -> str:
 def _check_driven(component: Component, pose: np.ndarray, motors: list[str], followers: list[str]
                   ) -> None:
     """Raise ValueError if loops cannot move; NotDriven if their motors do not determine a pose."""
-    if not component.loose(pose, [], LEANING)[0]:
+    if not component.undriven(pose, [], LEANING)[0]:
         fixed = [joint.name for joint in component.joints
                  if joint.kind == FIXED and joint.is_cut and joint.name]
         raise ValueError('it cannot move, as its joints hold each other' + bool(fixed) * (
@@ -139,19 +139,19 @@ def _check_driven(component: Component, pose: np.ndarray, motors: list[str], fol
         raise ValueError(
             f'{join_names(motors)} drive it, and hold each other, as {count} of them tell where '
             f'all is: replace them by --driven {shlex.join(chosen)} in the command')
-    loose, motions = component.loose(pose, motors + followers)
-    if not loose:
+    undriven, motions = component.undriven(pose, motors + followers)
+    if not undriven:
         return
     _check_unfolded(component, pose, motors, DEAD_POINT)
-    stiff = [joint.name for joint in component.joints if joint.name in loose
+    stiff = [joint.name for joint in component.joints if joint.name in undriven
              and joint.no_limits.endswith('no range')]
-    more = component.chosen(motions, sorted(loose, key=lambda name: name not in stiff))
+    more = component.chosen(motions, sorted(undriven, key=lambda name: name not in stiff))
     # Held, they must not stop all others.
     holds = [('hold', component.texts(pose, component.is_of(more)).values())] * bool(
-        component.loose(pose, more)[0])
+        component.undriven(pose, more)[0])
     raise NotDriven(
-        f'not driven: {len(more)} of {join_names(loose)} must be moved{" or held" * len(holds)}: '
-        + _added(('driven', [*motors, *more]), *holds)
+        f'not driven: {len(more)} of {join_names(undriven)} must be moved'
+        f'{" or held" * len(holds)}: ' + _added(('driven', [*motors, *more]), *holds)
         + f'; the limits of {join_names(stiff)} leave no range' * bool(stiff))
 
 
@@ -168,9 +168,9 @@ def _question(component: Component, poses: np.ndarray, which: np.ndarray,
               motors: Sequence[str] = ()) -> list[Question]:
     """Return the choice of two poses by the joint that differs most, if they are different."""
     # Of joints that differ alike the first.
-    apart = np.round(np.abs(component.away(poses[0] - poses[1])) * which, 4)
-    name = max(component.named, key=lambda name: apart[component.named[name]], default='')
-    if not name or apart[component.named[name]] < DISTINCT:
+    differences = np.round(np.abs(component.displacement(poses[0] - poses[1])) * which, 4)
+    name = max(component.named, key=lambda name: differences[component.named[name]], default='')
+    if not name or differences[component.named[name]] < DISTINCT:
         return []
     poses = poses[np.argsort(component.read(poses)[name])]
     side, other = (component.texts(pose, which) for pose in poses)
@@ -178,12 +178,12 @@ def _question(component: Component, poses: np.ndarray, which: np.ndarray,
     return [(f'with {where} as with {other[name]}', side, other)]
 
 
-def _check_unfolded(component: Component, pose: np.ndarray, motors: list[str], least: float
+def _check_unfolded(component: Component, pose: np.ndarray, motors: list[str], stiffness: float
                     ) -> None:
     """Raise ValueError at a dead point, which a linkage can leave in two ways."""
     if not motors:
         # Without motors, drive a joint that this pose does not stop.
-        sizes = np.linalg.norm(component.free_ways(pose, component.is_of([]), least), axis=0)
+        sizes = np.linalg.norm(component.free_ways(pose, component.is_of([]), stiffness), axis=0)
         motors = [max(component.named, key=lambda name: sizes[component.named[name]], default='')]
     fixed = component.is_of(motors)
     questions: list[Question] = []
@@ -191,19 +191,19 @@ def _check_unfolded(component: Component, pose: np.ndarray, motors: list[str], l
                    key=lambda step: not component.within(step[None], fixed)[0])
     for which, rows in component.independent(fixed):
         still = fixed | ~which
-        motions = component.free_ways(pose, still, least)
+        motions = component.free_ways(pose, still, stiffness)
         for way in motions if len(motions) > component.nullity(still) else ():
             # Where branches are near, both sides of one distance may end on the same.
             aside = ASIDE * component.unit * np.outer((3.0, -3.0, 1.0, -1.0), way)
             tried = [component.closed(step + aside, fixed, 40) for step in steps]
             pairs = [np.array(pair) for poses in tried for pair in combinations(
-                poses[component.gap(poses, rows) < component.near], 2)]
+                poses[component.residual(poses, rows) < component.near], 2)]
             if not pairs:
                 raise ValueError(f'its loops end where the file has {join_names(motors)}: choose '
                                  'another pose by --pose, or mend lengths or places in the file')
             # What moves as freely beside it, such as a ring on two pins, is no dead point.
-            if min(len(component.free_ways(beside, still, least))
-                   for poses in pairs for beside in poses) == len(motions):
+            if min(len(component.free_ways(perturbed, still, stiffness))
+                   for poses in pairs for perturbed in poses) == len(motions):
                 continue
             choices = [question for poses in pairs for question in _question(
                 component, poses, (way != 0.0) | fixed, motors)]
@@ -222,19 +222,19 @@ def nearest(component: Component, motors: list[str], followers: list[str], seed:
     are equally near.
     """
     start, fixed = component.start, component.is_of(motors)
-    gap = float(component.gap(start)[0])
+    opening = float(component.residual(start)[0])
     # Slightly inclined axes must not move undriven joints far.
     poses = component.closed(start, fixed, soft=1e-7)
-    if gap < NEAR and component.gap(poses)[0] <= max(component.near, gap) \
-            and np.linalg.norm(component.away(poses)) < 1e3 * max(gap, component.near):
+    if opening < NEAR and component.residual(poses)[0] <= max(component.near, opening) \
+            and np.linalg.norm(component.displacement(poses)) < 1e3 * max(opening, component.near):
         _check_unfolded(component, poses[0], motors,
-                        max(DEAD_POINT, 3.0 * math.sqrt(min(gap, 1e-4))))
+                        max(DEAD_POINT, 3.0 * math.sqrt(min(opening, 1e-4))))
         return poses[0], ''
     # If the loops cannot be closed otherwise, followers move, and then motors.
     candidates, still, open_by = start, motors, math.inf
     for names in [motors + followers] * bool(followers) + [motors] + [[]] * bool(motors):
         others = _searched(component, component.is_of(names), seed)
-        smallest = max(component.gap(others, rows).min()
+        smallest = max(component.residual(others, rows).min()
                        for _, rows in component.independent(component.is_of(names)))
         if smallest < 0.9 * open_by:
             candidates, still, open_by = others, names, smallest
@@ -244,14 +244,14 @@ def nearest(component: Component, motors: list[str], followers: list[str], seed:
         f'{", ".join(motors)} moved: their loops cannot be closed where the file has them.'
     fixed, pose, questions = component.is_of(still), candidates[0].copy(), []
     for which, rows in component.independent(fixed):
-        # Those with the smallest gap, inside limits if there are any; the nearest first.
-        gaps = component.gap(candidates, rows)
-        some = candidates[gaps <= 1.001 * gaps.min() + component.near]
+        # Those with the smallest residual, inside limits if there are any; the nearest first.
+        residuals = component.residual(candidates, rows)
+        some = candidates[residuals <= 1.001 * residuals.min() + component.near]
         inside = component.within(some, which)
         some = some[inside] if inside.any() else some
         determined = which & ~is_free(component.free_ways(some[0], fixed | ~which)) \
             if still else which
-        distances = np.linalg.norm(component.away(some) * determined, axis=1)
+        distances = np.linalg.norm(component.displacement(some) * determined, axis=1)
         first, *more = np.argsort(distances + NEARLY * np.linalg.norm(some, axis=1))
         pose[which] = some[first, which]
         choices = (_question(component, some[[first, i]], determined) for i in more
@@ -272,6 +272,6 @@ def _searched(component: Component, fixed: np.ndarray, seed: int) -> np.ndarray:
     spread = np.linspace(0.0, math.pi, count)[:, None] * ~fixed * component.unit
     poses = spread * np.random.default_rng(seed).uniform(-1.0, 1.0, (count, len(fixed)))
     poses = component.closed(component.closed(poses, fixed, 40, 1e-2), fixed, 12)
-    steps = component.away(component.closed(poses, fixed, 1, 1e-12) - poses)
+    steps = component.displacement(component.closed(poses, fixed, 1, 1e-12) - poses)
     at_rest = np.max(np.abs(steps), axis=1) < RESTING
     return poses[at_rest] if at_rest.any() else poses

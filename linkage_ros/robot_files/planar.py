@@ -19,7 +19,7 @@ from typing import NamedTuple, Sequence
 import numpy as np
 
 from . import check, closing
-from .spatial import ASKEW, CROSSING, EXACT, lean, loops_of
+from .spatial import ASKEW, CROSSING, EXACT, inclination, loops_of
 from .. import mechanisms, scene
 from ..linkage import bar_name, Dyads, Hinge, Pin, ROUNDING, short, Slide, theta_of
 from ..robot_model.robot import at, BALL, coordinates, FIXED, HINGE, Joint, NotDriven, Robot, SLIDE
@@ -63,13 +63,13 @@ def groups(robot: Robot) -> list[Group]:
 def _parts(robot: Robot, group: Group) -> list[Group]:
     """Return the planar parts of loops that are not planar as a whole."""
     parts: list[Group] = []
-    left = group.joints
+    rest = group.joints
     for joint in group.joints:
-        if joint.kind == HINGE and joint in left:
-            flat = [other for other in left
-                    if other.kind in _FLAT and lean(other, joint.axes[0]) < ASKEW]
+        if joint.kind == HINGE and joint in rest:
+            flat = [other for other in rest
+                    if other.kind in _FLAT and inclination(other, joint.axes[0]) < ASKEW]
             parts += [part for part in _groups(robot, flat) if not part.why]
-            left = [other for other in left if not any(other in part.joints for part in parts)]
+            rest = [other for other in rest if not any(other in part.joints for part in parts)]
     return parts
 
 
@@ -90,11 +90,11 @@ def _with_balls(robot: Robot) -> list[Joint]:
     """Return the joints with a ball in place of two or three hinges that cross in a point."""
     joints = robot.joints
     for body in reversed(robot.frames):
-        held = [joint for joint in joints if body in joint.bodies]
-        if body == robot.root or len(held) != 2 or any(
-                joint.name in robot.driven or joint.kind not in (HINGE, BALL) for joint in held):
+        pair = [joint for joint in joints if body in joint.bodies]
+        if body == robot.root or len(pair) != 2 or any(
+                joint.name in robot.driven or joint.kind not in (HINGE, BALL) for joint in pair):
             continue
-        first, second = held
+        first, second = pair
         ends = first.other(body), second.other(body)
         places = first.place(ends[0]), second.place(ends[1])
         if ends[0] != ends[1] and np.linalg.norm(places[0] - places[1]) < CROSSING \
@@ -102,7 +102,7 @@ def _with_balls(robot: Robot) -> list[Joint]:
                      or np.linalg.norm(np.cross(first.axes[0], second.axes[0])) > ASKEW):
             ball = Joint(f'{first.name}+{second.name}', BALL, ends, places, first.axes,
                          parts=(*chain(first, ends[0]), *chain(second, body)))
-            joints = [*(joint for joint in joints if joint not in held), ball]
+            joints = [*(joint for joint in joints if joint not in pair), ball]
     return joints
 
 
@@ -126,7 +126,7 @@ def _why_not_planar(ground: str, joints: Sequence[Joint]) -> str:
     for joint in joints:
         if joint.kind not in _FLAT:
             return f'not planar: {joint.name} is a joint of type {joint.kind}'
-        if (askew := lean(joint, hinges[0].axes[0])) > ASKEW:
+        if (askew := inclination(joint, hinges[0].axes[0])) > ASKEW:
             return (f'not planar: the axes of {hinges[0].name} and {joint.name} are '
                     f'{np.degrees(np.arcsin(min(askew, 1.0))):.3g} degrees from it, more '
                     f'than {np.degrees(ASKEW):.2g}')
@@ -136,25 +136,25 @@ def _why_not_planar(ground: str, joints: Sequence[Joint]) -> str:
 def _pins(joint: Joint, normal: np.ndarray) -> list[tuple[Joint, float]]:
     """Return the hinges of a ball that turn in a plane, with their signs."""
     return [(hinge, sign) for hinge, sign in joint.parts
-            if hinge.kind == HINGE and lean(hinge, normal) < ASKEW]
+            if hinge.kind == HINGE and inclination(hinge, normal) < ASKEW]
 
 
 def _why_loose(ground: str, joints: Sequence[Joint], normal: np.ndarray) -> str:
     """Return which body can leave the plane, '' if none: only rods may be on balls alone."""
-    held = {ground}
-    held_by = [joint for joint in joints if joint.kind != BALL
+    stiff = {ground}
+    joining = [joint for joint in joints if joint.kind != BALL
                or len(joint.hinges) == 2 and _pins(joint, normal)]
     # A universal joint with an axis normal to the plane is a pin, but a body can lean on it that
     # has no other pin.
-    pinned = [ground, *(body for joint in held_by for body in joint.bodies)]
-    held_by = [joint for joint in held_by if joint.kind != BALL
+    pinned = [ground, *(body for joint in joining for body in joint.bodies)]
+    joining = [joint for joint in joining if joint.kind != BALL
                or min(map(pinned.count, joint.bodies)) > 1]
-    while more := {end for joint in held_by for end in joint.bodies
-                   if held & {*joint.bodies}} - held:
-        held |= more
+    while more := {end for joint in joining for end in joint.bodies
+                   if stiff & {*joint.bodies}} - stiff:
+        stiff |= more
     for body in dict.fromkeys(end for joint in joints for end in joint.bodies):
         ends = [joint.bodies for joint in joints if body in joint.bodies]
-        if body not in held and (len(ends) != 2 or not all(held & {*pair} for pair in ends)):
+        if body not in stiff and (len(ends) != 2 or not all(stiff & {*pair} for pair in ends)):
             return f'not planar: {body} hangs on balls alone, and is no rod'
     return ''
 
@@ -170,7 +170,7 @@ class Drawing(Dyads):
     joints : list of Joint
         Joints whose places are complex [m], and so are the axes of slides; the axis of a hinge is
         1 or -1. Of a ball in the plane it is the hinge that turns.
-    gap, lean : float
+    opening, inclination : float
         The distance that cannot be closed [m], and the inclination of axes [rad].
     drives : list of Source
         The inputs.
@@ -193,10 +193,10 @@ class Drawing(Dyads):
         size = max(abs(place - other) for place in places for other in places)
         if size < CROSSING:
             raise ValueError('all its joints are at one place')
-        if self.gap > closing.OPEN * size:
-            raise ValueError(f'its loops cannot be closed: they stay open by {self.gap:.3g} m, '
-                             f'more than {closing.OPEN:g} of their size')
-        near = size * min(max(ROUNDING, 10.0 * self.gap / size), 1e-6)
+        if self.opening > closing.OPEN * size:
+            raise ValueError('its loops cannot be closed: they stay open by '
+                             f'{self.opening:.3g} m, more than {closing.OPEN:g} of their size')
+        near = size * min(max(ROUNDING, 10.0 * self.opening / size), 1e-6)
         pins: list[dict[str, complex]] = []
         for pin in (dict(zip(joint.bodies, joint.places)) for joint in self.joints
                     if joint.kind != SLIDE):
@@ -221,7 +221,7 @@ class Drawing(Dyads):
         ground = group.ground
         hinges = _hinges(ground, group.joints, drives)
         base, up = self._robot.frames[ground], hinges[0].axes[0]
-        self.lean = max(lean(joint, up) for joint in group.joints)
+        self.inclination = max(inclination(joint, up) for joint in group.joints)
         normal = base[:3, :3].T @ up
         right = np.eye(3)[int(abs(normal[0]) > 0.9)]
         right = (right - right @ normal * normal) / np.linalg.norm(np.cross(right, normal))
@@ -230,7 +230,7 @@ class Drawing(Dyads):
         self.frame = at(base[:3, :3].T @ (origin.places[0] - base[:3, 3]), turned)
         seen = np.linalg.inv(base @ self.frame)
         self.joints: list[Joint] = []
-        self.gap = 0.0
+        self.opening = 0.0
         stiff = {body for joint in group.joints for body in joint.bodies
                  if len(joint.hinges) == 2 and not _pins(joint, up)}
         for joint in group.joints:
@@ -244,8 +244,8 @@ class Drawing(Dyads):
             axis, slides = seen[:3, :3] @ joint.axes[0], joint.kind == SLIDE
             along = complex(*axis[:2]) / np.hypot(*axis[:2]) if slides else float(np.sign(axis[2]))
             self.joints.append(replace(joint, places=(first, second), axes=[along] * 2))
-            apart = second - first
-            self.gap = max(self.gap, abs((apart / along).imag if slides else apart))
+            vector = second - first
+            self.opening = max(self.opening, abs((vector / along).imag if slides else vector))
 
     def error(self, lines: Sequence[str], name: str) -> float:
         """Return how far lines have a joint from where the file has it [m]."""
@@ -312,20 +312,20 @@ class Drawing(Dyads):
         self.drives.append(check.Source(word + number, source, ratio, offset, value))
         return number, ''
 
-    def special_line(self, place: complex, other: complex, one: Pin, two: Pin) -> str | None:
+    def special_line(self, place: complex, other: complex, *pins: Pin) -> str | None:
         """Return the start of a line for bars that mirror others, and so pass dead points."""
-        (first, start), (second, end) = one, two
-        for corner, there in [pin for body in self.parts for pin in self.on[body].items()]:
+        (first, start), (second, end) = pins
+        for corner, corner_at in [item for body in self.parts for item in self.on[body].items()]:
             links = [{body for body in self.parts
                       if {corner, name} <= self.on[body].keys()} for name in (first, second)]
             if corner in (first, second) or not all(links) or links[0] == links[1]:
                 continue
-            opposite, along = start + end - there, end - start
-            kite, crossed = (start + along * ((point - start) / along).conjugate()
-                             for point in (there, opposite))
-            for word, seen in (('parallelogram', opposite), ('mirror', kite),
+            opposite, along = start + end - corner_at, end - start
+            mirrored, crossed = (start + along * ((point - start) / along).conjugate()
+                                 for point in (corner_at, opposite))
+            for word, seen in (('parallelogram', opposite), ('mirror', mirrored),
                                ('antiparallelogram', crossed)):
-                if max(abs(seen - place), abs(seen - other)) < self.near < abs(there - place):
+                if max(abs(seen - place), abs(seen - other)) < self.near < abs(corner_at - place):
                     return f'{word} {corner} {first} {second}'
         return None
 
@@ -356,10 +356,11 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported],
         else:
             reports.append(f'Left out: the limits of {drive.source}, from {ends[0]:.4g} to '
                            f'{ends[1]:.4g}: its loops do not reach them.')
-    slack = drawing.lean + drawing.gap / drawing.size
+    slack = drawing.inclination + drawing.opening / drawing.size
     if slack > EXACT:
-        reports.append(f'Warning: the file is not exact: axes lean by {drawing.lean:.2g} rad, and '
-                       f'loops stay open by {drawing.gap:.2g} m; so is what is published.')
+        reports.append('Warning: the file is not exact: axes lean by '
+                       f'{drawing.inclination:.2g} rad, and loops stay open '
+                       f'by {drawing.opening:.2g} m; so is what is published.')
     driven = [joint.name for joint in drawing.driven]
     return check.Imported(name, parameters, reports, driven, slack)
 

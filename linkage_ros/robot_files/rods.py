@@ -52,16 +52,16 @@ class Rods:
         self.rods: list[str] = []
         self.drives: list[check.Source] = []
         self._names: set[str] = {*FORMS, 'ground', 'at', 'axis', 'within', 'length'}
-        rods = {body: held for body, held in _on_bodies(group.joints).items()
-                if body != ground and [joint.kind for joint in held] == [BALL, BALL]}
+        rods = {body: ends for body, ends in _on_bodies(group.joints).items()
+                if body != ground and [joint.kind for joint in ends] == [BALL, BALL]}
         joints = [hinge for joint in group.joints for hinge in (
             [joint] if {*joint.bodies} & rods.keys() else joint.hinges)]
         held_by = _on_bodies(joints)
         halves = [joint for joint in joints if joint.kind == SLIDE and joint.name in self._driven
                   and all(len(held_by[body]) == 2 and body != ground for body in joint.bodies)]
         self._bodies = {ground: 'ground'}
-        apart = {*rods, *(body for half in halves for body in half.bodies)}
-        links = [joint for joint in joints if not apart & {*joint.bodies} and (
+        separate = {*rods, *(body for half in halves for body in half.bodies)}
+        links = [joint for joint in joints if not separate & {*joint.bodies} and (
             joint.kind == HINGE or joint.kind == SLIDE and joint.name not in self._driven)]
         while reached := [joint for joint in links
                           if len({*joint.bodies} & self._bodies.keys()) == 1]:
@@ -69,14 +69,14 @@ class Rods:
         # All others are between a link and a rod or a cylinder.
         known = [*halves, *(joint for joint, _ in self.links.values())]
         if wrong := [joint.name for joint in joints if joint not in known and not (
-                apart & {*joint.bodies} and self._bodies.keys() & {*joint.bodies})]:
+                separate & {*joint.bodies} and self._bodies.keys() & {*joint.bodies})]:
             raise ValueError('links on hinges and undriven slides can be joined by rods '
                              f'and cylinders, not by {join_names(wrong)}')
-        for body, held in rods.items():
-            first, second = held
+        for body, ends in rods.items():
+            first, second = ends
             self._rod(first.name, self._end(first, body), self._end(second, body),
                       first.place(body) - second.place(body))
-            self._universal(body, held)
+            self._universal(body, ends)
         for half in halves:
             self._cylinder(half, [next(joint for joint in held_by[body] if joint is not half)
                                   for body in half.bodies])
@@ -116,9 +116,9 @@ class Rods:
         length = short(float(np.linalg.norm(way)))
         self.rods.append(f'{self._named(name)} rod {first} {second} length {length}')
 
-    def _universal(self, body: str, held: Sequence[Joint]) -> None:
+    def _universal(self, body: str, balls: Sequence[Joint]) -> None:
         """Add two hinges of a ball at an end of a rod, if it has some; a third one stays."""
-        for ball, other in held, held[::-1]:
+        for ball, other in balls, balls[::-1]:
             base, place = ball.other(body), ball.place(body)
             hinges, axes = zip(*((hinge, sign * hinge.axes[0])
                                  for hinge, sign in chain(ball, base)))

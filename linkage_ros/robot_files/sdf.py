@@ -160,7 +160,7 @@ class _Model:
                    None if second is None else self._axis(name, second))
         mimic = part.find('axis/mimic')
         if mimic is not None:
-            ratio, start, offset = numbers([text(mimic, *each) for each in (
+            ratio, start, offset = numbers([text(mimic, *query) for query in (
                 ('multiplier', '1'), ('reference', '0'), ('offset', '0'))])
             robot.follow(name, self.named(name, mimic.get('joint', '')), ratio,
                          offset - ratio * start)

@@ -38,7 +38,7 @@ EXACT = 1e-9
 DEAD_POINT = 3e-4
 
 
-def lean(joint: Joint, normal: np.ndarray) -> float:
+def inclination(joint: Joint, normal: np.ndarray) -> float:
     """Return the inclination of a joint's axes against those of a plane [rad]."""
     if joint.kind == SLIDE:
         return float(abs(joint.axes[0] @ normal))
@@ -154,14 +154,14 @@ class Component:
                        ) -> None:
         """Set the points that coincide on both ends of each cut."""
         ends, points = [], []
-        leans = max(lean(joint, self._up) for joint in self.joints)
+        leans = max(inclination(joint, self._up) for joint in self.joints)
         is_flat = leans < ASKEW and all(joint in cuts or joint.kind in (HINGE, SLIDE)
                                         for joint in self.joints)
         self.near = CLOSED + 2.0 * leans * is_flat
         for cut in cuts:
             end = [last[body] for body in cut.bodies]
             places = np.array(cut.places)
-            # Nothing moves along the axes of a planar loop, and a gap there changes no angle.
+            # Nothing moves along the axes of a planar loop, and an opening there changes no angle.
             places[1] += self._up * (self._up @ (places[0] - places[1])) * is_flat
             offsets = [np.zeros((2, 3))]
             if cut.kind == HINGE:
@@ -241,18 +241,18 @@ class Component:
                 break
         return poses
 
-    def gap(self, poses: np.ndarray, rows: Any = slice(None)) -> np.ndarray:
+    def residual(self, poses: np.ndarray, rows: Any = slice(None)) -> np.ndarray:
         """Return the largest residual in each pose, of all or of some rows, as a part of size."""
         return np.max(np.abs(self.errors(poses)[0][:, rows]), axis=1, initial=0.0) / self.size
 
     def independent(self, fixed: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return screws and residuals of loops that share no joint but those that are fixed."""
         moved = np.any(self._signs.sum(axis=1, keepdims=True), axis=1) & ~fixed
-        near = (moved @ moved.T) | np.all(self._ends[:, None] == self._ends, axis=2)
-        while np.any((more := near @ near) != near):
-            near = more
+        linked = (moved @ moved.T) | np.all(self._ends[:, None] == self._ends, axis=2)
+        while np.any((more := linked @ linked) != linked):
+            linked = more
         return [(np.any(moved[rows], axis=0), np.repeat(rows, 3))
-                for rows in np.unique(near, axis=0)]
+                for rows in np.unique(linked, axis=0)]
 
     def within(self, poses: np.ndarray, which: np.ndarray) -> np.ndarray:
         """Return in which poses joints are inside their limits, of some screws."""
@@ -282,7 +282,7 @@ class Component:
             moved[screw.body] = moved.get(screw.body, np.eye(4)) @ step
         return moved
 
-    def away(self, poses: np.ndarray) -> np.ndarray:
+    def displacement(self, poses: np.ndarray) -> np.ndarray:
         """
         Return how far screws are from where the file has them [rad, or of the size].
 
@@ -290,7 +290,7 @@ class Component:
         """
         return np.where(self._slides, poses / self.size, wrapped(poses)) * ~self._in_balls
 
-    def free_ways(self, pose: np.ndarray, fixed: np.ndarray, least: float = DEAD_POINT
+    def free_ways(self, pose: np.ndarray, fixed: np.ndarray, stiffness: float = DEAD_POINT
                   ) -> np.ndarray:
         """
         Return in which ways screws can move in a pose, a row each, at least at first.
@@ -299,7 +299,7 @@ class Component:
         """
         slope = self.errors(pose[None], True)[1][0][:, ~fixed]
         _, values, motions = np.linalg.svd(slope)
-        basis = np.zeros((len(motions) - np.sum(values > least * self.size), len(fixed)))
+        basis = np.zeros((len(motions) - np.sum(values > stiffness * self.size), len(fixed)))
         basis[:, ~fixed] = motions[len(motions) - len(basis):]
         return basis
 
@@ -308,11 +308,11 @@ class Component:
         pose = np.random.default_rng(2).uniform(-0.3, 0.3, len(fixed)) * self.unit
         return len(self.free_ways(pose, fixed))
 
-    def loose(self, pose: np.ndarray, motors: Sequence[str], least: float = DEAD_POINT
+    def undriven(self, pose: np.ndarray, motors: Sequence[str], stiffness: float = DEAD_POINT
               ) -> tuple[list[str], np.ndarray]:
         """Return the joints that move while motors do not, and the ways in which they do."""
         # The spin of a rod on balls does not count.
-        motions = self.free_ways(pose, self.is_of(motors), least) * ~self._in_balls
+        motions = self.free_ways(pose, self.is_of(motors), stiffness) * ~self._in_balls
         return [name for name, i in self.named.items() if is_free(motions)[i]], motions
 
     def read(self, poses: np.ndarray) -> dict[str, np.ndarray]:

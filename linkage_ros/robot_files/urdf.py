@@ -103,9 +103,9 @@ def _close_by_elements(robot: Robot, root: Element) -> None:
               for frame in root.findall('frame')}
     for cut in root.findall('linear_bushing_rpy'):
         ends = [attribute(cut, f'bushing_frame{end}', 'name') for end in 'AC']
-        (link, place), (other, there) = (frames.get(end, (end, np.eye(4))) for end in ends)
+        (link, start), (other, stop) = (frames.get(end, (end, np.eye(4))) for end in ends)
         stiff = numbers(attribute(cut, 'bushing_torque_stiffness', 'value', '0 0 0'))
-        robot.close('='.join(ends), FIXED if stiff.all() else BALL, (link, other), [place, there])
+        robot.close('='.join(ends), FIXED if stiff.all() else BALL, (link, other), [start, stop])
 
 
 def _close_by_frames(robot: Robot) -> None:

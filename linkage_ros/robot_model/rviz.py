@@ -37,9 +37,9 @@ def adapted(config: dict, mechanisms: Mapping[str, SceneMechanism], frame_id: st
     manager = made['Visualization Manager']
     displays = manager['Displays']
     places = [i for i, display in enumerate(displays) if display['Class'] == GROUP]
-    text, topics = json.dumps(displays[places[0]]), f'/{namespace.strip("/")}/'.replace('//', '/')
-    own = f'"/{displays[places[0]]["Name"]}/'
-    groups = [{**json.loads(text.replace(own, f'"{topics}{name}/')), 'Name': name}
+    text, prefix = json.dumps(displays[places[0]]), f'/{namespace.strip("/")}/'.replace('//', '/')
+    topic = f'"/{displays[places[0]]["Name"]}/'
+    groups = [{**json.loads(text.replace(topic, f'"{prefix}{name}/')), 'Name': name}
               for name in mechanisms]
     displays[places[0]:places[-1] + 1] = groups
     manager['Global Options']['Fixed Frame'] = frame_id
