@@ -90,7 +90,7 @@ class Walk(NamedTuple):
     """
     Positions along paths (paths, steps), and how far loops stand open there [m].
 
-    An opening is NaN where there is no pose. `joints` has the sources, too; `poses` are those of each
+    An opening is NaN without a pose. `joints` has the sources, too; `poses` are those of each
     step. `good` tells where the loops are closed on all of the way.
     """
 

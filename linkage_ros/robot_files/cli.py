@@ -136,7 +136,8 @@ def _checked(robot: Robot, balls: Sequence[Sequence[str]], imported: Sequence[ch
             *reports, *(f'Left out: {name}: {WRONG}: {why}.' for name, why in wrong.items())])
     reports = [*reports, *(report for made in imported for report in made.reports), *checks]
     if lost:
-        reports.append(not_published(lost))
+        reports.append(f'Not published: {", ".join(lost)}: passive joints of loops that no mechanism '
+                       'determines. What they carry has no transform.')
     if free := [joint.name for joint in robot.joints
                 if not joint.is_cut and joint.kind not in (HINGE, SLIDE, FIXED)]:
         reports.append(f'Not published: {", ".join(free)}: a ball or a free joint has no one '
@@ -177,12 +178,6 @@ def others(robot: Robot, mechanisms: Mapping[str, scene.SceneMechanism],
         [(crank.name, 1.0, name, zeros[name]) for name, crank in cranks.items()
          if crank.source != name],
         **{f'{crank.name}.speed': 0.0 for crank in cranks.values()})}, lost
-
-
-def not_published(names: Sequence[str]) -> str:
-    """Return the report on joints that nothing determines."""
-    return (f'Not published: {", ".join(names)}: passive joints of loops that no mechanism '
-            'determines. What they carry has no transform.')
 
 
 def positions(texts: Sequence[str]) -> dict[str, float]:

@@ -17,7 +17,7 @@ from .spatial import ASKEW, Component, components, DEAD_POINT, is_free
 from ..robot_model.robot import FIXED, NotDriven, Robot, with_positions
 from ..words import join_names
 
-# An opening that is smaller, of the size of its loops, is rounding: files have angles such as 1.5708.
+# A smaller opening, of the size of its loops, is rounding: files have angles such as 1.5708.
 # Such loops are closed without a search, as far as they can be.
 NEAR = 1e-3
 # Loops with a larger opening, of their size, are open: files have rounded numbers.
