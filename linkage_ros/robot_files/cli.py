@@ -136,8 +136,8 @@ def _checked(robot: Robot, balls: Sequence[Sequence[str]], imported: Sequence[ch
             *reports, *(f'Left out: {name}: {WRONG}: {why}.' for name, why in wrong.items())])
     reports = [*reports, *(report for made in imported for report in made.reports), *checks]
     if lost:
-        reports.append(f'Not published: {", ".join(lost)}: passive joints of loops that no mechanism '
-                       'determines. What they carry has no transform.')
+        reports.append(f'Not published: {", ".join(lost)}: passive joints of loops that no '
+                       'mechanism determines. What they carry has no transform.')
     if free := [joint.name for joint in robot.joints
                 if not joint.is_cut and joint.kind not in (HINGE, SLIDE, FIXED)]:
         reports.append(f'Not published: {", ".join(free)}: a ball or a free joint has no one '
