@@ -219,7 +219,7 @@ class Inverse:
             output by the first input, by the second and so on.
 
         """
-        rows = np.broadcast_arrays(*self._each(values))
+        rows = np.broadcast_arrays(*self._per_output(values))
         solutions = self._all_arrays(np.stack([row.ravel() for row in rows]))
         solutions = np.moveaxis(solutions, 0, -1).reshape(
             solutions.shape[1], *rows[0].shape, len(solutions))
@@ -280,7 +280,7 @@ class Inverse:
 
     def _numbers(self, values: Any, name: str = 'values', finite: bool = False) -> Row:
         """Return one number for each output; raise ValueError if there are not as many."""
-        parts = self._each(values, name)
+        parts = self._per_output(values, name)
         try:
             row = tuple([x if type(x) is float else x.item() for x in parts])
         except ValueError:
@@ -289,7 +289,7 @@ class Inverse:
             raise ValueError(f'{name} must be finite, got {short_repr([*row])}')
         return row
 
-    def _each(self, values: Any, name: str = 'values') -> tuple[Any, ...]:
+    def _per_output(self, values: Any, name: str = 'values') -> tuple[Any, ...]:
         """Return a float or an array for each output; raise ValueError if they are not that."""
         if not isinstance(values, (list, tuple)):
             values = [values] if type(values) is float else np.atleast_1d(numbers(name, values))
@@ -334,8 +334,8 @@ class Inverse:
             If there is not one value for each output, or ends are not finite and in order.
 
         """
-        n, limits, values = self._n, checked_ends(self._n, ends), self._each(values)
-        seed = () if near is None else self._each(near, 'near')
+        n, limits, values = self._n, checked_ends(self._n, ends), self._per_output(values)
+        seed = () if near is None else self._per_output(near, 'near')
         if {float} == {*map(type, values), *map(type, seed)}:
             row = self._choice.of(self._all(values, seed), seed, limits)
             return tuple(row[:n]), tuple(row[n:])
@@ -366,7 +366,7 @@ class Inverse:
         """
         limits = checked_ends(self._n, ends)
         seed: Row = () if near is None else self._numbers(near, 'near', finite=True)
-        rows = [np.atleast_1d(row) for row in np.broadcast_arrays(*self._each(values))]
+        rows = [np.atleast_1d(row) for row in np.broadcast_arrays(*self._per_output(values))]
         if rows[0].ndim > 1:
             raise self._miscounted(values, 'values')
         solutions = self._all_arrays(np.stack(rows), np.repeat(
