@@ -212,7 +212,7 @@ def check_nearest(mechanism, invert, output, inputs=None, nears=None, beside=Non
             gap -= linkage.is_angle(output) * math.tau * np.round(gap / math.tau)
             assert size * np.nanmin(np.abs(gap)) <= close * max(1.0, size * linkage.longest)
     # Away from ends a closed form is checked, and so is a series: neither is corrected.
-    assert parts is not None or close > 2e-14 or nears or max(taken) == 1
+    assert parts is not None or close > 2e-14 or max(taken) == 1
     for value in (1e3, -1e3, math.nan, math.inf):
         assert linkage.is_angle(output) and math.isfinite(value) or not invert(value, 0.0)[0]
 

@@ -431,13 +431,14 @@ def test_a_package_names_what_the_scene_names(mechanisms):
 @pytest.mark.parametrize('arguments, said', [
     *((['--out', '{0}/' + name], f"single underscores, a letter first, not '{name}'")
       for name in ('My-Package', 'a', '1a', 'a__b', 'a_', 'a' * 65)),
-    (['--out', '{0}'], 'or one written by this command, but'),
+    *((['--out', folder], 'or one written by this command, but') for folder in ('{0}', '{0}/cpp')),
     ([], 'one of the arguments --out --limits is required'),
     (['--out', '{0}/legs', '--joints', 'elbow'], "no mechanism has a joint 'elbow'"),
     (['--out', '{0}/legs', '--joints', 'kneee'], 'did you mean knee?')])
 def test_what_cannot_be_written_is_one_sentence(tmp_path, capsys, arguments, said):
     folder = tmp_path / 'mine'
-    folder.mkdir()
+    (folder / 'cpp').mkdir(parents=True)
+    (folder / 'cpp' / 'CMakeLists.txt').touch()
     (folder / 'notes.txt').write_text('keep')
     (folder / 'package.xml').write_bytes(b'<package>\xff')
     assert transmission.main([str(ROOT / 'examples' / 'leg.yaml'),

@@ -142,8 +142,9 @@ def _chain(mechanism: SceneMechanism) -> list[str]:
 
     try:
         for _ in mechanism.inputs:
-            chosen.append(min((link for link in links if link.name not in chosen
-                               and _tell(mechanism, [*chosen, link.name])), key=rank).name)
+            chosen.append(min((
+                link for link in links if link.name not in chosen
+                and _may_determine(mechanism, [*chosen, link.name])), key=rank).name)
         invertible(mechanism, [_joint(mechanism, output) for output in chosen])
         return chosen
     except ValueError:
@@ -151,7 +152,7 @@ def _chain(mechanism: SceneMechanism) -> list[str]:
         return list(mechanism.inputs)
 
 
-def _tell(mechanism: SceneMechanism, outputs: Sequence[str]) -> bool:
+def _may_determine(mechanism: SceneMechanism, outputs: Sequence[str]) -> bool:
     """Return whether each output may depend on another one of the inputs."""
     moves = mechanism.linkage.moves
     return any(all(map(moves, outputs, inputs)) for inputs in permutations(

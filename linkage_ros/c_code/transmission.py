@@ -33,9 +33,10 @@ def write(args: list[str] | None) -> None:
     except ValueError as error:
         raise cli.RequestError(str(error)) from None
     xml = out / 'package.xml'
-    if xml.exists() and 'written by linkage_ros' not in xml.read_text(errors='replace'):
+    is_ours = xml.is_file() and 'written by linkage_ros' in xml.read_text(errors='replace')
+    if out.exists() and any(out.iterdir()) and not is_ours:
         raise cli.RequestError('--out must be a new folder, or one written by this command, but '
-                               f'{xml} is of another package')
+                               f'{out} has other files')
     for path, text in files.items():
         (out / path).parent.mkdir(parents=True, exist_ok=True)
         (out / path).write_text(text, encoding='utf-8')

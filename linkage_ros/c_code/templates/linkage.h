@@ -21,7 +21,7 @@
 #endif
 
 /* A Jacobian below this part of its size is singular. */
-#define LKR_LEAST LKR_OF(1e-6, 1e-3f)
+#define LKR_MIN_PIVOT LKR_OF(1e-6, 1e-3f)
 /* A command may be so far beyond a sweep: half of all digits, which next to an extreme is rounding. */
 #define LKR_BEYOND LKR_OF(1e-6, 5e-4f)
 /* A position is reached at ENOUGH; where rounding allows no less, CLOSE times the rate or STEEPEST
@@ -29,6 +29,8 @@
 #define LKR_ENOUGH LKR_OF(1e-14, 2e-6f)
 #define LKR_CLOSE LKR_OF(1e-13, 4e-6f)
 #define LKR_STEEPEST LKR_OF(4e6, 1e3f)
+/* Rounding of inputs, and of a pose at them. */
+#define LKR_ROUNDING (4 * LKR_OF(DBL_EPSILON, FLT_EPSILON))
 /* Terms of a series. */
 #define LKR_TERMS LKR_OF(20, 8)
 #define LKR_NAN ((lkr_real)NAN)
@@ -188,16 +190,16 @@ typedef struct {
 
 /* --- positions at a pose --- */
 
-/* Gaps from a pose to positions, the shorter way round; returns their sum, in sizes. */
-static inline lkr_real lkr_gap(const lkr_model *model, int side, const lkr_real *position,
-    const lkr_point *p, lkr_real *gap)
+/* Residuals of positions at a pose, the shorter way round; returns their sum, in sizes. */
+static inline lkr_real lkr_residual(const lkr_model *model, int side, const lkr_real *position,
+    const lkr_point *p, lkr_real *residual)
 {
     lkr_real sum = 0;
     int i;
     for (i = 0; i < model->inputs; i++) {
         const lkr_axis *axis = &model->axis[side][i];
-        gap[i] = lkr_near(position[i] - p->position[side][i], 0, axis->turn);
-        sum += LKR_MATH(fabs)(gap[i]) * axis->scale;
+        residual[i] = lkr_near(position[i] - p->position[side][i], 0, axis->turn);
+        sum += LKR_MATH(fabs)(residual[i]) * axis->scale;
     }
     return sum;
 }
@@ -229,7 +231,7 @@ static inline int lkr_solve(const lkr_model *model, int side, const lkr_point *p
             best = LKR_MATH(fabs)(a[i][k]) > LKR_MATH(fabs)(a[best][k]) ? i : best;
         }
         pivot = a[best][k];
-        if (!(LKR_MATH(fabs)(pivot) > LKR_LEAST * most)) {
+        if (!(LKR_MATH(fabs)(pivot) > LKR_MIN_PIVOT * most)) {
             return 0;
         }
         for (j = k; j <= n; j++) {
@@ -259,10 +261,10 @@ static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, l
     int i, k, solutions = 0;
     for (k = 0; k < count && solutions < LKR_MAX_SOLUTIONS; k++) {
         const lkr_piece *part = &piece[k];
-        const lkr_real gap = lkr_near(value - LKR_FROM_FLASH(part->middle), 0, turn);
-        if (LKR_MATH(fabs)(gap) <= LKR_FROM_FLASH(part->reach) + LKR_CLOSE * size) {
+        const lkr_real offset = lkr_near(value - LKR_FROM_FLASH(part->middle), 0, turn);
+        if (LKR_MATH(fabs)(offset) <= LKR_FROM_FLASH(part->reach) + LKR_CLOSE * size) {
             const lkr_real square =
-                gap * LKR_FROM_FLASH(part->scale) + LKR_FROM_FLASH(part->shift);
+                offset * LKR_FROM_FLASH(part->scale) + LKR_FROM_FLASH(part->shift);
             const lkr_real x =
                 LKR_MATH(sqrt)(lkr_max(0, square)) - LKR_FROM_FLASH(part->center);
             lkr_real sum = LKR_FROM_FLASH(part->term[LKR_TERMS - 1]);
@@ -275,6 +277,17 @@ static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, l
         }
     }
     return solutions;
+}
+
+/* How far rounding of inputs may move positions, in sizes: after many turns they have fewer digits. */
+static inline lkr_real lkr_input_rounding(const lkr_model *model, const lkr_real *q)
+{
+    lkr_real largest = 0;
+    int i;
+    for (i = 0; i < model->inputs; i++) {
+        largest = lkr_max(largest, LKR_MATH(fabs)(q[i]) * model->input[i].scale);
+    }
+    return LKR_ROUNDING * largest;
 }
 
 /* Whether what is left may be rounding: of the positions; of the inputs, where a position changes fast.
@@ -304,10 +317,10 @@ static inline lkr_real lkr_beyond(const lkr_input *input, lkr_real x)
 /* Turn inputs to where they are nearest to near ones and to the sweeps; returns how far they are from
    near ones, INFINITY or NaN if not allowed. A command has to be in the sweeps, up to rounding. What is
    measured may be outside, which counts ten times more. */
-static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_real *near,
+static inline lkr_real lkr_turn_near(const lkr_model *model, int side, const lkr_real *near,
     lkr_real *q)
 {
-    lkr_real away = 0;
+    lkr_real distance = 0;
     int i;
     for (i = 0; i < model->inputs; i++) {
         const lkr_input *input = &model->input[i];
@@ -325,12 +338,12 @@ static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_rea
                 return INFINITY;
             }
             inside = lkr_clamped(q[i], input->low, input->high);
-            away += 10 * lkr_beyond(input, q[i]) * input->scale;
+            distance += 10 * lkr_beyond(input, q[i]) * input->scale;
         }
         q[i] = side == LKR_JOINTS ? inside : q[i];
-        away += LKR_MATH(fabs)(q[i] - near[i]) * input->scale;
+        distance += LKR_MATH(fabs)(q[i] - near[i]) * input->scale;
     }
-    return away;
+    return distance;
 }
 
 /* Correct the inputs of p to those of positions next to its own, with their pose, see lkr_model.at;
@@ -349,8 +362,8 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
         for (i = 0; i < model->inputs; i++) {
             p->q[i] += step[i];
         }
-        left = model->at(has_rates, p) ? lkr_gap(model, side, position, p, step) : INFINITY;
-        if (left <= LKR_ENOUGH) {
+        left = model->at(has_rates, p) ? lkr_residual(model, side, position, p, step) : INFINITY;
+        if (left <= LKR_ENOUGH || left <= lkr_input_rounding(model, p->q)) {
             return poses;
         }
         if (!(left < least)) {
@@ -377,7 +390,7 @@ static inline int lkr_find(const lkr_model *model, int side, const lkr_real *pos
 {
     lkr_real value[LKR_MAX_INPUTS], near[LKR_MAX_INPUTS];
     lkr_real q[LKR_MAX_SOLUTIONS][LKR_MAX_INPUTS];
-    lkr_real away[LKR_MAX_SOLUTIONS + 1];
+    lkr_real distance[LKR_MAX_SOLUTIONS + 1];
     int count, i, k;
     for (i = 0; i < model->inputs; i++) {
         const lkr_axis *axis = &model->axis[side][i];
@@ -386,23 +399,23 @@ static inline int lkr_find(const lkr_model *model, int side, const lkr_real *pos
     }
     count = model->solutions[side](value, q);
     for (k = 0; k < count; k++) {
-        away[k] = lkr_bring(model, side, near, q[k]);
+        distance[k] = lkr_turn_near(model, side, near, q[k]);
     }
-    away[count] = INFINITY;
+    distance[count] = INFINITY;
     for (;;) {
         int nearest = count;
         int poses;
         for (k = 0; k < count; k++) {
-            nearest = away[k] < away[nearest] ? k : nearest;
+            nearest = distance[k] < distance[nearest] ? k : nearest;
         }
         if (nearest == count) {
             return 0;
         }
-        away[nearest] = INFINITY;
+        distance[nearest] = INFINITY;
         memcpy(p->q, q[nearest], sizeof p->q);
         poses = lkr_refine(model, side, position, has_rates, p);
         /* Newton's method may leave a sweep: then the pose is that at its end. */
-        if (poses == 1 || (poses == 2 && lkr_bring(model, side, near, p->q) < INFINITY
+        if (poses == 1 || (poses == 2 && lkr_turn_near(model, side, near, p->q) < INFINITY
                 && model->at(has_rates, p))) {
             return 1;
         }
@@ -436,15 +449,15 @@ static inline void lkr_begin(const lkr_model *model, lkr_memory *m)
 /* Find the pose of positions, and keep it as the newest; returns a status. */
 static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, const lkr_real *position)
 {
-    lkr_real gap[LKR_MAX_INPUTS];
+    lkr_real residual[LKR_MAX_INPUTS];
     lkr_point p = m->point;
     int i;
-    if (!lkr_copy(model->inputs, position, gap)) {
+    if (!lkr_copy(model->inputs, position, residual)) {
         return LKR_NOT_KNOWN;
     }
     /* Where it is already it stays, whatever rounding says; but a command has to be in the sweeps. */
-    if ((!m->is_known || lkr_gap(model, side, position, &p, gap) > LKR_ENOUGH
-            || lkr_bring(model, side, m->point.q, p.q) != 0)
+    if ((!m->is_known || lkr_residual(model, side, position, &p, residual) > LKR_ENOUGH
+            || lkr_turn_near(model, side, m->point.q, p.q) != 0)
         && !lkr_find(model, side, position, m->point.q, 1, &p)) {
         return LKR_OUT_OF_REACH;
     }
