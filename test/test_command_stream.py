@@ -55,9 +55,9 @@ class Stream:
 
 
 @pytest.fixture
-def stream(graph):
-    """Start the node with a lever and a four-bar."""
-    return Stream(graph, LEVER)
+def stream(graph, request):
+    """Start the node with a lever and a four-bar, or with what a test asks for."""
+    return Stream(graph, getattr(request, 'param', LEVER))
 
 
 def flap(servo):
@@ -338,8 +338,9 @@ def test_a_trajectory_that_cannot_be_is_refused_as_a_whole(graph, plan, capfd):
     assert not any(one() for one in refused)
 
 
+@pytest.mark.parametrize('stream', [SEVERAL], indirect=True)
 def test_a_newer_trajectory_ends_the_older_one(graph, plan):
-    # Alone, the older one takes a third of a second; a message that gets lost comes later.
-    tried = ((plan(['flap', 'bar_QB'], *[([0.1, 1.2], [])] * 3000), plan(['flap'], ([0.1], [])))
-             for _ in range(3))
-    assert any(graph.until(newer) and not older() for older, newer in tried)
+    # Alone, the older one takes seconds, however late the newer one comes.
+    older = plan(FOOT + BUCKET, *[(LINE.tolist(), [])] * 10_000)
+    newer = plan(FOOT, (LINE[:2].tolist(), []))
+    assert graph.until(newer) and not older()
