@@ -243,7 +243,7 @@ class Kinematics:
         return 2 * turns
 
     def _passes_change_point(self, by: int) -> bool:
-        """Return whether a dyad of a crank has a gap of nothing but rounding."""
+        """Return whether a dyad of a crank has a margin of nothing but rounding."""
         margins = [(limit.tolerance, *limit.ends[:2]) for limit in self.formulas.built.limits
                    if limit.ends and limit.ends.theta.args[0] == by]
         values = [tuple(map(self.value, margin)) for margin in margins]

@@ -88,8 +88,8 @@ class Follower:
         """Compare a full announcement with this node's mechanisms: equal ones are followed."""
         fields, present = self._parameters.followed, self._parameters.scene.mechanisms
         values = {parameter.name: parameter.value
-                for name in {name.partition('.')[0] for name in announced} & present.keys()
-                for parameter in present[name].parameters}
+                  for name in {name.partition('.')[0] for name in announced} & present.keys()
+                  for parameter in present[name].parameters}
         self._owner, self._waiting = event.node, {}
         unlike = {name.partition('.')[0]: name for name in announced
                   if fields[name].read_only and values[name] != announced[name]}

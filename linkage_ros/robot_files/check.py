@@ -169,9 +169,10 @@ class _Loops:
         """Raise Difference if a joint is not where the file has it."""
         component = self._component
         start = self._positions({name: np.array([value]) for name, value in self._start.items()})
-        seen = component.read(component.moved_to(component.start, start))
+        seen, drawn = map(component.read, (
+            component.moved_to(component.start, start), component.start))
         for name in start:
-            off = float(seen[name][0] - component.read(component.start)[name][0])
+            off = float(seen[name][0] - drawn[name][0])
             off = abs(off) / component.unit[component.named[name]]
             if off > OTHER + self._slack:
                 raise Difference(f'{self._at(self._start)} {name} is off by {off:.2g}')

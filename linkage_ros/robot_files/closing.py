@@ -222,13 +222,14 @@ def nearest(component: Component, motors: list[str], followers: list[str], seed:
     are equally near.
     """
     start, fixed = component.start, component.is_of(motors)
-    opening = float(component.residual(start)[0])
+    residual = float(component.residual(start)[0])
     # Slightly inclined axes must not move undriven joints far.
     poses = component.closed(start, fixed, soft=1e-7)
-    if opening < NEAR and component.residual(poses)[0] <= max(component.near, opening) \
-            and np.linalg.norm(component.displacement(poses)) < 1e3 * max(opening, component.near):
+    if residual < NEAR and component.residual(poses)[0] <= max(component.near, residual) \
+            and np.linalg.norm(component.displacement(poses)) < 1e3 * max(
+                residual, component.near):
         _check_unfolded(component, poses[0], motors,
-                        max(DEAD_POINT, 3.0 * math.sqrt(min(opening, 1e-4))))
+                        max(DEAD_POINT, 3.0 * math.sqrt(min(residual, 1e-4))))
         return poses[0], ''
     # If the loops cannot be closed otherwise, followers move, and then motors.
     candidates, still, open_by = start, motors, math.inf

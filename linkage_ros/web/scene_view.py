@@ -200,11 +200,11 @@ class SceneView:
 
     def _saved(self, owner: str) -> str:
         """Return a parameter file of a node's scene: its definition and changed values."""
-        old = self._scenes[owner]
-        names = {parameter.name for parameter in old.parameters}
+        current = self._scenes[owner]
+        names = {parameter.name for parameter in current.parameters}
         # An input that was stopped is saved with the speed that it had.
         speeds = {name: speed for name, speed in self._speeds[owner].items() if name in names}
-        return writing.in_yaml(writing.without_defaults(scene.changed(old, speeds)))
+        return writing.in_yaml(writing.without_defaults(scene.changed(current, speeds)))
 
     async def read(self, text: str) -> JsonObject:
         """Return the result of `poses.number`."""

@@ -239,8 +239,8 @@ class _LinkTree:
                     and self._in_a_row(links):
                 return (first, second), links[::-1]
         line, links = min(unsolved, key=lambda rod: len(rod[1]))
-        others = [second.names[0] for second, also in unsolved
-                  if second is not line and set(also) & set(links)]
+        others = [other.names[0] for other, also in unsolved
+                  if other is not line and set(also) & set(links)]
         raise line.error(
             f'{join_names(links)} between its ends are unplaced'
             f'{f", as for {join_names(others)}" if others else ""}: one rod places one hinge or '
