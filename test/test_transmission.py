@@ -157,7 +157,7 @@ CHOICES = [
     # It cannot be commanded there, but at its ends, where Newton's method does not leave it.
     (SLOT, {'crank.start': 0.5, 'crank.sweep': [0.2, 0.8]}, ['A.y'], 1,
      [(0.02 * math.cos(0.9), None), (0.02 * math.cos(0.8), 0.8), (0.02 * math.cos(0.2), 0.2),
-      (0.02 * math.cos(0.8 + 9e-7), 0.8), (0.02 * math.cos(0.8 + 2e-6), None)]),
+      (0.02 * math.cos(0.8 + 1e-14), 0.8), (0.02 * math.cos(0.8 + 1e-11), None)]),
     *((SLOT, {'crank.start': 0.5, 'crank.sweep': [0.2, end]}, ['A.y'], 1,
        [(0.02 * math.cos(end), end)]) for end in (0.6, 0.7, 0.9, 1.0, 1.1)),
     # A turn from what is nearest may be in it.

@@ -22,7 +22,7 @@ from ..scene import SceneMechanism
 from ..words import join_names, n_inputs, plain_text
 
 # Poses of a solution of an inverse: the first, again with its rates, and after a step of Newton's
-# method. A sweep's end adds one to the answer's.
+# method.
 POSES = 3
 
 
@@ -95,7 +95,7 @@ def _values(request: Request, single: bool) -> dict[str, Any]:
                           f'{_with_units(linkage, axes)}', ([], axes))
               for tag, axes in inverses.items()]
     _, counts, functions = zip(*tables.solutions.values())
-    about = [*_about(mechanism), f'A call takes at most {POSES * max(counts) + 1} poses.']
+    about = [*_about(mechanism), f'A call takes at most {POSES * max(counts)} poses.']
     return {
         'about': '\n'.join(f' * {line}' for line in about), 'name': name, 'float': int(single),
         'number': code.number, 'suffix': '##f' * single, 'own_inputs': len(linkage.inputs),

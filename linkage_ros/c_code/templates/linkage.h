@@ -22,15 +22,11 @@
 
 /* A Jacobian below this part of its size is singular. */
 #define LKR_MIN_PIVOT LKR_OF(1e-6, 1e-3f)
-/* A command may be so far beyond a sweep: half of all digits, which next to an extreme is rounding. */
-#define LKR_BEYOND LKR_OF(1e-6, 5e-4f)
-/* A position is reached at ENOUGH; where rounding allows no less, CLOSE times the rate or STEEPEST
-   may be left [rad, sizes]. */
-#define LKR_ENOUGH LKR_OF(1e-14, 2e-6f)
+/* A position is reached at ENOUGH; where rounding allows no less, at CLOSE; at so many times more
+   where lkr_rounding says so, up to STEEPEST for rates [rad, sizes]. */
+#define LKR_ENOUGH LKR_OF(1e-14, 1e-6f)
 #define LKR_CLOSE LKR_OF(1e-13, 4e-6f)
 #define LKR_STEEPEST LKR_OF(4e6, 1e3f)
-/* Rounding of inputs, and of a pose at them. */
-#define LKR_ROUNDING (4 * LKR_OF(DBL_EPSILON, FLT_EPSILON))
 /* Terms of a series. */
 #define LKR_TERMS LKR_OF(20, 8)
 #define LKR_NAN ((lkr_real)NAN)
@@ -279,33 +275,25 @@ static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, l
     return solutions;
 }
 
-/* How far rounding of inputs may move positions, in sizes: after many turns they have fewer digits. */
-static inline lkr_real lkr_input_rounding(const lkr_model *model, const lkr_real *q)
+/* How many times more rounding leaves than of positions of size 1: of larger ones, and after many turns;
+   with has_rates, where they change fast. At an end of the reach the rate is infinite, yet rounding is
+   not. */
+static inline lkr_real lkr_rounding(const lkr_model *model, int side, const lkr_real *position,
+    const lkr_point *p, int has_rates)
 {
-    lkr_real largest = 0;
-    int i;
-    for (i = 0; i < model->inputs; i++) {
-        largest = lkr_max(largest, LKR_MATH(fabs)(q[i]) * model->input[i].scale);
-    }
-    return LKR_ROUNDING * largest;
-}
-
-/* Whether what is left may be rounding: of the positions; of the inputs, where a position changes fast.
-   At an end of the reach the rate is infinite, yet rounding is not. */
-static inline int lkr_is_rounding(const lkr_model *model, int side, const lkr_real *position,
-    const lkr_point *p, lkr_real left)
-{
-    lkr_real steepest = 1;
+    lkr_real most = 1;
     int i, j;
     for (i = 0; i < model->inputs; i++) {
         const lkr_real scale = model->axis[side][i].scale;
-        steepest = lkr_max(steepest, LKR_MATH(fabs)(position[i]) * scale);
-        for (j = 0; j < model->inputs; j++) {
-            steepest = lkr_max(steepest, LKR_MATH(fabs)(p->rate[side][i][j]) * scale
-                * lkr_max(model->input[j].size, LKR_MATH(fabs)(p->q[j])));
+        most = lkr_max(most, LKR_MATH(fabs)(p->q[i]) * model->input[i].scale);
+        most = lkr_max(most, LKR_MATH(fabs)(position[i]) * scale);
+        for (j = 0; j < model->inputs * has_rates; j++) {
+            const lkr_input *input = &model->input[j];
+            most = lkr_max(most, lkr_max(1, LKR_MATH(fabs)(p->q[j]) * input->scale)
+                * lkr_clamped(LKR_MATH(fabs)(p->rate[side][i][j]) * scale * input->size, 0, LKR_STEEPEST));
         }
     }
-    return left <= LKR_CLOSE * lkr_clamped(steepest, 1, LKR_STEEPEST);
+    return most;
 }
 
 /* How far x is beyond the sweep. */
@@ -314,9 +302,9 @@ static inline lkr_real lkr_beyond(const lkr_input *input, lkr_real x)
     return LKR_MATH(fabs)(x - lkr_clamped(x, input->low, input->high));
 }
 
-/* Turn inputs to where they are nearest to near ones and to the sweeps; returns how far they are from
-   near ones, INFINITY or NaN if not allowed. A command has to be in the sweeps, up to rounding. What is
-   measured may be outside, which counts ten times more. */
+/* Turn inputs to where they are nearest to near ones and to the sweeps, those of a command into the
+   sweeps; returns how far they are from near ones. What is measured may be outside, which counts ten
+   times more. */
 static inline lkr_real lkr_turn_near(const lkr_model *model, int side, const lkr_real *near,
     lkr_real *q)
 {
@@ -328,59 +316,58 @@ static inline lkr_real lkr_turn_near(const lkr_model *model, int side, const lkr
         q[i] += lkr_turns(near[i] - q[i], input->turn[side]);
         inside = lkr_clamped(q[i], input->low, input->high);
         if (q[i] != inside) {
-            const lkr_real slack = LKR_BEYOND * input->size;
-            const lkr_real turn = q[i] < inside ? input->turn[side] : -input->turn[side];
-            if (lkr_beyond(input, q[i]) > slack
-                && lkr_beyond(input, q[i] + turn) < lkr_beyond(input, q[i])) {
-                q[i] += turn;
+            const lkr_real other = q[i] + (q[i] < inside ? input->turn[side] : -input->turn[side]);
+            /* At an end of the sweep rounding is no reason for another turn. */
+            const lkr_real rounding = LKR_CLOSE * LKR_STEEPEST * input->size;
+            if (lkr_beyond(input, other) + rounding < lkr_beyond(input, q[i])) {
+                q[i] = other;
             }
-            if (side == LKR_JOINTS && lkr_beyond(input, q[i]) > slack) {
-                return INFINITY;
+            if (side == LKR_JOINTS) {
+                q[i] = lkr_clamped(q[i], input->low, input->high);
             }
-            inside = lkr_clamped(q[i], input->low, input->high);
             distance += 10 * lkr_beyond(input, q[i]) * input->scale;
         }
-        q[i] = side == LKR_JOINTS ? inside : q[i];
         distance += LKR_MATH(fabs)(q[i] - near[i]) * input->scale;
     }
     return distance;
 }
 
 /* Correct the inputs of p to those of positions next to its own, with their pose, see lkr_model.at;
-   returns 0 if there are none, 1 if they are its own, else 2. One step of Newton's method is enough:
-   it squares what is left, but next to an extreme, where what is left may be rounding. */
+   returns 0 if there are none. One step of Newton's method is enough: it squares what is left, but next
+   to an extreme, where what is left may be rounding. */
 static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *position,
-    int has_rates, lkr_point *p)
+    const lkr_real *near, int has_rates, lkr_point *p)
 {
-    lkr_real best[LKR_MAX_INPUTS];
-    lkr_real step[LKR_MAX_INPUTS] = { 0 };
+    lkr_point best;
+    lkr_real step[LKR_MAX_INPUTS];
     lkr_real least = LKR_OTHER;
     int is_rounding = 0;
-    int i, poses;
-    for (poses = 1; poses <= 2; poses++) {
-        lkr_real left;
-        for (i = 0; i < model->inputs; i++) {
-            p->q[i] += step[i];
-        }
-        left = model->at(has_rates, p) ? lkr_residual(model, side, position, p, step) : INFINITY;
-        if (left <= LKR_ENOUGH || left <= lkr_input_rounding(model, p->q)) {
-            return poses;
+    int i, is_last;
+    for (is_last = 0;; is_last = 1) {
+        const lkr_real left =
+            model->at(has_rates, p) ? lkr_residual(model, side, position, p, step) : INFINITY;
+        if (left <= LKR_ENOUGH * lkr_rounding(model, side, position, p, 0)) {
+            return 1;
         }
         if (!(left < least)) {
             break;
         }
         least = left;
-        memcpy(best, p->q, sizeof best);
         has_rates = has_rates || model->at(1, p);
-        is_rounding = lkr_is_rounding(model, side, position, p, left);
-        if (poses == 2 || !lkr_solve(model, side, p, 0, step)) {
+        best = *p;
+        is_rounding = left <= LKR_CLOSE * lkr_rounding(model, side, position, p, 1);
+        if (is_last || !lkr_solve(model, side, p, 0, step)) {
             break;
         }
+        for (i = 0; i < model->inputs; i++) {
+            p->q[i] += step[i];
+        }
+        (void)lkr_turn_near(model, side, near, p->q);
     }
     if (is_rounding) {
-        memcpy(p->q, best, sizeof best);
+        *p = best;
     }
-    return 2 * is_rounding;
+    return is_rounding;
 }
 
 /* The pose of positions whose inputs are nearest to some, see lkr_model.at; returns 0 if there is
@@ -404,7 +391,6 @@ static inline int lkr_find(const lkr_model *model, int side, const lkr_real *pos
     distance[count] = INFINITY;
     for (;;) {
         int nearest = count;
-        int poses;
         for (k = 0; k < count; k++) {
             nearest = distance[k] < distance[nearest] ? k : nearest;
         }
@@ -413,10 +399,7 @@ static inline int lkr_find(const lkr_model *model, int side, const lkr_real *pos
         }
         distance[nearest] = INFINITY;
         memcpy(p->q, q[nearest], sizeof p->q);
-        poses = lkr_refine(model, side, position, has_rates, p);
-        /* Newton's method may leave a sweep: then the pose is that at its end. */
-        if (poses == 1 || (poses == 2 && lkr_turn_near(model, side, near, p->q) < INFINITY
-                && model->at(has_rates, p))) {
+        if (lkr_refine(model, side, position, near, has_rates, p)) {
             return 1;
         }
     }
