@@ -42,7 +42,7 @@ typedef float lkr_real;
 #define LKR_MIN_PIVOT LKR_OF(1e-6, 1e-3f)
 /* A position is reached at ENOUGH; where rounding allows no less, at CLOSE; at so many times more
    where lkr_rounding says so, up to STEEPEST for rates [rad, sizes]. */
-#define LKR_ENOUGH LKR_OF(1e-14, 1e-6f)
+#define LKR_ENOUGH LKR_OF(1e-14, 2e-6f)
 #define LKR_CLOSE LKR_OF(1e-13, 4e-6f)
 #define LKR_STEEPEST LKR_OF(4e6, 1e3f)
 /* Terms of a series. */
@@ -296,7 +296,7 @@ static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, l
 /* How many times more rounding leaves than of positions of size 1: of larger ones, and after many turns;
    with has_rates, where they change fast. At an end of the reach the rate is infinite, yet rounding is
    not. */
-static inline lkr_real lkr_rounding(const lkr_model *model, int side, const lkr_real *position,
+LKR_FORMULA lkr_real lkr_rounding(const lkr_model *model, int side, const lkr_real *position,
     const lkr_point *p, int has_rates)
 {
     lkr_real most = 1;
@@ -308,7 +308,8 @@ static inline lkr_real lkr_rounding(const lkr_model *model, int side, const lkr_
         for (j = 0; j < model->inputs * has_rates; j++) {
             const lkr_input *input = &model->input[j];
             most = lkr_max(most, lkr_max(1, LKR_MATH(fabs)(p->q[j]) * input->scale)
-                * lkr_clamped(LKR_MATH(fabs)(p->rate[side][i][j]) * scale * input->size, 0, LKR_STEEPEST));
+                * lkr_clamped(LKR_MATH(fabs)(p->rate[side][i][j]) * scale * input->size,
+                    0, LKR_STEEPEST));
         }
     }
     return most;
@@ -320,9 +321,9 @@ static inline lkr_real lkr_beyond(const lkr_input *input, lkr_real x)
     return LKR_MATH(fabs)(x - lkr_clamped(x, input->low, input->high));
 }
 
-/* Turn inputs to where they are nearest to near ones and to the sweeps, those of a command into the
-   sweeps; returns how far they are from near ones. What is measured may be outside, which counts ten
-   times more. */
+/* Turn inputs to where they are nearest to near ones and to the sweeps; returns how far they are from
+   near ones, NaN if not allowed. A command has to be in the sweeps, up to rounding. What is measured may
+   be outside, which counts ten times more. */
 static inline lkr_real lkr_turn_near(const lkr_model *model, int side, const lkr_real *near,
     lkr_real *q)
 {
@@ -340,10 +341,11 @@ static inline lkr_real lkr_turn_near(const lkr_model *model, int side, const lkr
             if (lkr_beyond(input, other) + rounding < lkr_beyond(input, q[i])) {
                 q[i] = other;
             }
-            if (side == LKR_JOINTS) {
-                q[i] = lkr_clamped(q[i], input->low, input->high);
-            }
             distance += 10 * lkr_beyond(input, q[i]) * input->scale;
+            if (side == LKR_JOINTS) {
+                q[i] = lkr_beyond(input, q[i]) > rounding ? LKR_NAN
+                    : lkr_clamped(q[i], input->low, input->high);
+            }
         }
         distance += LKR_MATH(fabs)(q[i] - near[i]) * input->scale;
     }
@@ -354,17 +356,18 @@ static inline lkr_real lkr_turn_near(const lkr_model *model, int side, const lkr
    returns 0 if there are none. One step of Newton's method is enough: it squares what is left, but next
    to an extreme, where what is left may be rounding. */
 static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *position,
-    const lkr_real *near, int has_rates, lkr_point *p)
+    int has_rates, lkr_point *p)
 {
     lkr_point best;
-    lkr_real step[LKR_MAX_INPUTS];
+    lkr_real step[LKR_MAX_INPUTS] = { 0 };
     lkr_real least = LKR_OTHER;
     int is_rounding = 0;
     int i, is_last;
     for (is_last = 0;; is_last = 1) {
         const lkr_real left =
             model->at(has_rates, p) ? lkr_residual(model, side, position, p, step) : INFINITY;
-        if (left <= LKR_ENOUGH * lkr_rounding(model, side, position, p, 0)) {
+        if (left <= LKR_ENOUGH
+            || left <= LKR_ENOUGH * lkr_rounding(model, side, position, p, 0)) {
             return 1;
         }
         if (!(left < least)) {
@@ -379,8 +382,10 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
         }
         for (i = 0; i < model->inputs; i++) {
             p->q[i] += step[i];
+            if (side == LKR_JOINTS) {
+                p->q[i] = lkr_clamped(p->q[i], model->input[i].low, model->input[i].high);
+            }
         }
-        (void)lkr_turn_near(model, side, near, p->q);
     }
     if (is_rounding) {
         *p = best;
@@ -417,7 +422,7 @@ static inline int lkr_find(const lkr_model *model, int side, const lkr_real *pos
         }
         distance[nearest] = INFINITY;
         memcpy(p->q, q[nearest], sizeof p->q);
-        if (lkr_refine(model, side, position, near, has_rates, p)) {
+        if (lkr_refine(model, side, position, has_rates, p)) {
             return 1;
         }
     }
