@@ -38,20 +38,20 @@ typedef float lkr_real;
 #error "double is a float on this machine: print the header again with --float"
 #endif
 
-/* A Jacobian below this part of its size is singular. */
+/* A Jacobian with a smaller pivot than this part of its largest element is singular. */
 #define LKR_MIN_PIVOT LKR_OF(1e-6, 1e-3f)
-/* A position is reached at ENOUGH; where rounding allows no less, at CLOSE; at so many times more
-   where lkr_rounding says so, up to STEEPEST for rates [rad, sizes]. */
-#define LKR_ENOUGH LKR_OF(1e-14, 2e-6f)
-#define LKR_CLOSE LKR_OF(1e-13, 4e-6f)
-#define LKR_STEEPEST LKR_OF(4e6, 1e3f)
+/* Residuals of a position [rad, sizes]: a smaller one than CONVERGED needs no correction, and after one
+   TOLERANCE is allowed. Both are times lkr_condition, in which rates count up to MAX_RATE. */
+#define LKR_CONVERGED LKR_OF(1e-14, 2e-6f)
+#define LKR_TOLERANCE LKR_OF(1e-13, 4e-6f)
+#define LKR_MAX_RATE LKR_OF(4e6, 1e3f)
 /* Terms of a series. */
 #define LKR_TERMS LKR_OF(20, 8)
 #define LKR_NAN ((lkr_real)NAN)
-/* Where there is no sweep it ends in infinity; tcc has no -INFINITY in a table. */
-#define LKR_ENDLESS LKR_OF(2 * DBL_MAX, 2 * FLT_MAX)
-/* A solution that misses by more than this belongs to another assembly [rad, sizes]. */
-#define LKR_OTHER ((lkr_real)0.01)
+/* The end of an input without a sweep is infinite; tcc has no -INFINITY in a table. */
+#define LKR_UNLIMITED LKR_OF(2 * DBL_MAX, 2 * FLT_MAX)
+/* A solution with a larger residual belongs to another assembly [rad, sizes]. */
+#define LKR_OTHER_ASSEMBLY ((lkr_real)0.01)
 
 /* Formulas are inlined wherever a pose is needed, so that only what is used there is computed. */
 #define LKR_FORMULA static inline __attribute__((always_inline))
@@ -75,13 +75,13 @@ typedef float lkr_real;
 
 /* --- numbers --- */
 
-/* The larger one, quicker than fmax; b is left out if it is NaN. */
+/* The larger number, quicker than fmax; a if b is NaN. */
 static inline lkr_real lkr_max(lkr_real a, lkr_real b)
 {
     return b > a ? b : a;
 }
 
-static inline lkr_real lkr_clamped(lkr_real x, lkr_real low, lkr_real high)
+static inline lkr_real lkr_clamp(lkr_real x, lkr_real low, lkr_real high)
 {
     return x > high ? high : lkr_max(x, low);
 }
@@ -92,18 +92,19 @@ LKR_FORMULA lkr_real lkr_turns(lkr_real x, lkr_real turn)
     return 2 * LKR_MATH(fabs)(x) > turn ? turn * LKR_MATH(floor)(x / turn + (lkr_real)0.5) : 0;
 }
 
-/* x in the turn nearest to `near`. */
-LKR_FORMULA lkr_real lkr_near(lkr_real x, lkr_real near, lkr_real turn)
+/* x plus the whole turns that bring it nearest to a center. */
+LKR_FORMULA lkr_real lkr_wrapped(lkr_real x, lkr_real center, lkr_real turn)
 {
-    return x - lkr_turns(x - near, turn);
+    return x - lkr_turns(x - center, turn);
 }
 
-/* A limit that is missed by rounding counts as reached. */
+/* x, or NaN if a margin is negative by more than rounding. */
 static inline lkr_real lkr_valid_where(lkr_real x, lkr_real margin, lkr_real tolerance)
 {
     return margin >= -tolerance ? x : LKR_NAN;
 }
 
+/* The square root, of a number that is negative by rounding 0. */
 static inline lkr_real lkr_root(lkr_real x, lkr_real tolerance)
 {
     return LKR_MATH(sqrt)(x > 0 ? x : lkr_valid_where(0, x, tolerance));
@@ -212,7 +213,7 @@ static inline lkr_real lkr_residual(const lkr_model *model, int side, const lkr_
     int i;
     for (i = 0; i < model->inputs; i++) {
         const lkr_axis *axis = &model->axis[side][i];
-        residual[i] = lkr_near(position[i] - p->position[side][i], 0, axis->turn);
+        residual[i] = lkr_wrapped(position[i] - p->position[side][i], 0, axis->turn);
         sum += LKR_MATH(fabs)(residual[i]) * axis->scale;
     }
     return sum;
@@ -275,8 +276,8 @@ static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, l
     int i, k, solutions = 0;
     for (k = 0; k < count && solutions < LKR_MAX_SOLUTIONS; k++) {
         const lkr_piece *part = &piece[k];
-        const lkr_real offset = lkr_near(value - LKR_FROM_FLASH(part->middle), 0, turn);
-        if (LKR_MATH(fabs)(offset) <= LKR_FROM_FLASH(part->reach) + LKR_CLOSE * size) {
+        const lkr_real offset = lkr_wrapped(value - LKR_FROM_FLASH(part->middle), 0, turn);
+        if (LKR_MATH(fabs)(offset) <= LKR_FROM_FLASH(part->reach) + LKR_TOLERANCE * size) {
             const lkr_real square =
                 offset * LKR_FROM_FLASH(part->scale) + LKR_FROM_FLASH(part->shift);
             const lkr_real x =
@@ -286,17 +287,17 @@ static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, l
                 sum = sum * x + LKR_FROM_FLASH(part->term[i]);
             }
             q[solutions][0] =
-                lkr_clamped(sum, LKR_FROM_FLASH(part->low), LKR_FROM_FLASH(part->high));
+                lkr_clamp(sum, LKR_FROM_FLASH(part->low), LKR_FROM_FLASH(part->high));
             solutions++;
         }
     }
     return solutions;
 }
 
-/* How many times more rounding leaves than of positions of size 1: of larger ones, and after many turns;
-   with has_rates, where they change fast. At an end of the reach the rate is infinite, yet rounding is
-   not. */
-LKR_FORMULA lkr_real lkr_rounding(const lkr_model *model, int side, const lkr_real *position,
+/* The condition number of positions: how many times the rounding of numbers of size 1 they have, as
+   positions or inputs are large, after many turns, or, with has_rates, as rates are. At an end of the
+   reach a rate is infinite, yet rounding is not. */
+LKR_FORMULA lkr_real lkr_condition(const lkr_model *model, int side, const lkr_real *position,
     const lkr_point *p, int has_rates)
 {
     lkr_real most = 1;
@@ -308,8 +309,8 @@ LKR_FORMULA lkr_real lkr_rounding(const lkr_model *model, int side, const lkr_re
         for (j = 0; j < model->inputs * has_rates; j++) {
             const lkr_input *input = &model->input[j];
             most = lkr_max(most, lkr_max(1, LKR_MATH(fabs)(p->q[j]) * input->scale)
-                * lkr_clamped(LKR_MATH(fabs)(p->rate[side][i][j]) * scale * input->size,
-                    0, LKR_STEEPEST));
+                * lkr_clamp(LKR_MATH(fabs)(p->rate[side][i][j]) * scale * input->size,
+                    0, LKR_MAX_RATE));
         }
     }
     return most;
@@ -318,13 +319,13 @@ LKR_FORMULA lkr_real lkr_rounding(const lkr_model *model, int side, const lkr_re
 /* How far x is beyond the sweep. */
 static inline lkr_real lkr_beyond(const lkr_input *input, lkr_real x)
 {
-    return LKR_MATH(fabs)(x - lkr_clamped(x, input->low, input->high));
+    return LKR_MATH(fabs)(x - lkr_clamp(x, input->low, input->high));
 }
 
-/* Turn inputs to where they are nearest to near ones and to the sweeps; returns how far they are from
-   near ones, NaN if not allowed. A command has to be in the sweeps, up to rounding. What is measured may
-   be outside, which counts ten times more. */
-static inline lkr_real lkr_turn_near(const lkr_model *model, int side, const lkr_real *near,
+/* Add whole turns to inputs, so that they are in the sweeps and next to near ones; returns their
+   distance from those, INFINITY if not allowed. A command has to be in the sweeps, up to rounding. A
+   measurement may be outside, and this part of the distance counts ten times. */
+static inline lkr_real lkr_unwrap(const lkr_model *model, int side, const lkr_real *near,
     lkr_real *q)
 {
     lkr_real distance = 0;
@@ -333,41 +334,41 @@ static inline lkr_real lkr_turn_near(const lkr_model *model, int side, const lkr
         const lkr_input *input = &model->input[i];
         lkr_real inside;
         q[i] += lkr_turns(near[i] - q[i], input->turn[side]);
-        inside = lkr_clamped(q[i], input->low, input->high);
+        inside = lkr_clamp(q[i], input->low, input->high);
         if (q[i] != inside) {
             const lkr_real other = q[i] + (q[i] < inside ? input->turn[side] : -input->turn[side]);
-            /* At an end of the sweep rounding is no reason for another turn. */
-            const lkr_real rounding = LKR_CLOSE * LKR_STEEPEST * input->size;
+            /* Outside by rounding alone is no reason for another turn. */
+            const lkr_real rounding = LKR_TOLERANCE * LKR_MAX_RATE * input->size;
             if (lkr_beyond(input, other) + rounding < lkr_beyond(input, q[i])) {
                 q[i] = other;
             }
             distance += 10 * lkr_beyond(input, q[i]) * input->scale;
             if (side == LKR_JOINTS) {
                 q[i] = lkr_beyond(input, q[i]) > rounding ? LKR_NAN
-                    : lkr_clamped(q[i], input->low, input->high);
+                    : lkr_clamp(q[i], input->low, input->high);
             }
         }
         distance += LKR_MATH(fabs)(q[i] - near[i]) * input->scale;
     }
-    return distance;
+    return distance < INFINITY ? distance : INFINITY;
 }
 
-/* Correct the inputs of p to those of positions next to its own, with their pose, see lkr_model.at;
-   returns 0 if there are none. One step of Newton's method is enough: it squares what is left, but next
-   to an extreme, where what is left may be rounding. */
+/* Correct p to the pose of positions next to its own, see lkr_model.at; returns 0 if there is none. One
+   step of Newton's method is enough: it squares the residual, except next to an extreme, where the
+   residual may be rounding. */
 static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *position,
     int has_rates, lkr_point *p)
 {
     lkr_point best;
     lkr_real step[LKR_MAX_INPUTS] = { 0 };
-    lkr_real least = LKR_OTHER;
+    lkr_real least = LKR_OTHER_ASSEMBLY;
     int is_rounding = 0;
     int i, is_last;
-    for (is_last = 0;; is_last = 1) {
+    for (is_last = 0; is_last <= 1; is_last++) {
         const lkr_real left =
             model->at(has_rates, p) ? lkr_residual(model, side, position, p, step) : INFINITY;
-        if (left <= LKR_ENOUGH
-            || left <= LKR_ENOUGH * lkr_rounding(model, side, position, p, 0)) {
+        if (left <= LKR_CONVERGED
+            || left <= LKR_CONVERGED * lkr_condition(model, side, position, p, 0)) {
             return 1;
         }
         if (!(left < least)) {
@@ -376,14 +377,14 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
         least = left;
         has_rates = has_rates || model->at(1, p);
         best = *p;
-        is_rounding = left <= LKR_CLOSE * lkr_rounding(model, side, position, p, 1);
+        is_rounding = left <= LKR_TOLERANCE * lkr_condition(model, side, position, p, 1);
         if (is_last || !lkr_solve(model, side, p, 0, step)) {
             break;
         }
         for (i = 0; i < model->inputs; i++) {
             p->q[i] += step[i];
             if (side == LKR_JOINTS) {
-                p->q[i] = lkr_clamped(p->q[i], model->input[i].low, model->input[i].high);
+                p->q[i] = lkr_clamp(p->q[i], model->input[i].low, model->input[i].high);
             }
         }
     }
@@ -400,32 +401,29 @@ static inline int lkr_find(const lkr_model *model, int side, const lkr_real *pos
 {
     lkr_real value[LKR_MAX_INPUTS], near[LKR_MAX_INPUTS];
     lkr_real q[LKR_MAX_SOLUTIONS][LKR_MAX_INPUTS];
-    lkr_real distance[LKR_MAX_SOLUTIONS + 1];
-    int count, i, k;
+    lkr_real distance[LKR_MAX_SOLUTIONS];
+    int count, tries, i, k;
     for (i = 0; i < model->inputs; i++) {
         const lkr_axis *axis = &model->axis[side][i];
         value[i] = axis->ratio * (position[i] - axis->offset);
-        near[i] = lkr_clamped(from[i], model->input[i].low, model->input[i].high);
+        near[i] = lkr_clamp(from[i], model->input[i].low, model->input[i].high);
     }
     count = model->solutions[side](value, q);
     for (k = 0; k < count; k++) {
-        distance[k] = lkr_turn_near(model, side, near, q[k]);
+        distance[k] = lkr_unwrap(model, side, near, q[k]);
     }
-    distance[count] = INFINITY;
-    for (;;) {
-        int nearest = count;
-        for (k = 0; k < count; k++) {
+    for (tries = 0; tries < count; tries++) {
+        int nearest = 0;
+        for (k = 1; k < count; k++) {
             nearest = distance[k] < distance[nearest] ? k : nearest;
         }
-        if (nearest == count) {
-            return 0;
-        }
-        distance[nearest] = INFINITY;
         memcpy(p->q, q[nearest], sizeof p->q);
-        if (lkr_refine(model, side, position, has_rates, p)) {
+        if (distance[nearest] < INFINITY && lkr_refine(model, side, position, has_rates, p)) {
             return 1;
         }
+        distance[nearest] = INFINITY;
     }
+    return 0;
 }
 
 /* The inputs for outputs, nearest to near ones, whole turns included. Returns 0, and leaves inputs
@@ -453,7 +451,7 @@ static inline void lkr_begin(const lkr_model *model, lkr_memory *m)
 }
 
 /* Find the pose of positions, and keep it as the newest; returns a status. */
-static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, const lkr_real *position)
+static inline int lkr_update(const lkr_model *model, lkr_memory *m, int side, const lkr_real *position)
 {
     lkr_real residual[LKR_MAX_INPUTS];
     lkr_point p = m->point;
@@ -462,15 +460,15 @@ static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, cons
         return LKR_NOT_KNOWN;
     }
     /* Where it is already it stays, whatever rounding says; but a command has to be in the sweeps. */
-    if ((!m->is_known || lkr_residual(model, side, position, &p, residual) > LKR_ENOUGH
-            || lkr_turn_near(model, side, m->point.q, p.q) != 0)
+    if ((!m->is_known || lkr_residual(model, side, position, &p, residual) > LKR_CONVERGED
+            || lkr_unwrap(model, side, m->point.q, p.q) != 0)
         && !lkr_find(model, side, position, m->point.q, 1, &p)) {
         return LKR_OUT_OF_REACH;
     }
     for (i = 0; side == LKR_JOINTS && i < model->inputs; i++) {
         /* An actuator goes on in the turn in which it is. */
         lkr_real *at = &p.position[LKR_ACTUATORS][i];
-        *at = lkr_near(*at, m->held[LKR_ACTUATORS][i], model->axis[LKR_ACTUATORS][i].turn);
+        *at = lkr_wrapped(*at, m->held[LKR_ACTUATORS][i], model->axis[LKR_ACTUATORS][i].turn);
     }
     m->is_known = 1;
     m->point = p;
@@ -528,7 +526,7 @@ static inline int lkr_transmit(const lkr_model *model, lkr_memory *m, int side, 
         /* Where an actuator is measured is newer than its command, within the reach or not. */
         (void)lkr_copy(model->inputs, from->position, m->held[LKR_ACTUATORS]);
     }
-    position = lkr_move(model, m, side, from->position);
+    position = lkr_update(model, m, side, from->position);
     if (!m->is_known) {
         return position | LKR_NOT_KNOWN;
     }
@@ -701,7 +699,7 @@ static const __attribute__((unused)) lkr_model lever_model = {
     1, { 1, 1 }, lever_model_at, { lever_solutions_angle_crank, lever_solutions_angle_lever },
     /* The actuators, the joints, the inputs and their starts. */
     { { { 1.0f, 0.0f, 1.0f, INFINITY } }, { { 1.0f, 0.0f, 1.0f, 6.2831855f } } },
-    { { 1.0f, 1.0f, -LKR_ENDLESS, LKR_ENDLESS, { INFINITY, 6.2831855f } } }, { 0.0f }
+    { { 1.0f, 1.0f, -LKR_UNLIMITED, LKR_UNLIMITED, { INFINITY, 6.2831855f } } }, { 0.0f }
 };
 
 /* Positions, and rates if has_rates, else 0, at the inputs of p; returns 0 if it cannot be assembled. */
@@ -721,7 +719,7 @@ static const __attribute__((unused)) lkr_model lever_for_angle_lever = {
     1, { 0, 1 }, lever_for_angle_lever_at, { 0, lever_solutions_angle_lever },
     /* The actuators, the joints, the inputs and their starts. */
     { { { 0, 0, 0, 0 } }, { { 1.0f, 0.0f, 1.0f, 6.2831855f } } },
-    { { 1.0f, 1.0f, -LKR_ENDLESS, LKR_ENDLESS, { 6.2831855f, 6.2831855f } } }, { 0.0f }
+    { { 1.0f, 1.0f, -LKR_UNLIMITED, LKR_UNLIMITED, { 6.2831855f, 6.2831855f } } }, { 0.0f }
 };
 
 #endif /* LINKAGE_ROS_lever_H */

@@ -88,7 +88,7 @@ class Tables:
                     position += f' + {code.literal(axis.offset)}'
                 middle = sides[0] and i in inputs and limits.middle(self.mechanism, axis) or 0.0
                 if axis.wraps or middle:
-                    position = f'lkr_near({position}, {code.literal(middle)}, ' \
+                    position = f'lkr_wrapped({position}, {code.literal(middle)}, ' \
                                f'{code.literal(axis.turn)})'
                 yield f'p->position[{side}][{i}] = {position};'
                 for j in inputs:
@@ -109,7 +109,7 @@ class Tables:
             turns = [input_.turn if input_.wraps and i not in inputs else math.inf
                      for inputs in indices]
             size = self.mechanism.scales[i] * input_.size
-            yield size, 1.0 / size, *(sweep or ('-LKR_ENDLESS', 'LKR_ENDLESS')), turns
+            yield size, 1.0 / size, *(sweep or ('-LKR_UNLIMITED', 'LKR_UNLIMITED')), turns
 
     # --- inverses ---
 

@@ -106,7 +106,7 @@ Pose pose(const double (&q)[n])
 double apart(int side, int i, double one, double other)
 {
   const lkr_axis & axis = model.axis[side][i];
-  return std::fabs(lkr_near(one - other, 0, axis.turn)) * axis.scale;
+  return std::fabs(lkr_wrapped(one - other, 0, axis.turn)) * axis.scale;
 }
 
 void at(Robot & robot, const Pose & where)
