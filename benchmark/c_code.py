@@ -155,20 +155,17 @@ def main():
             for which, target in TARGETS.items() if shutil.which(f'{target.compiler}gcc')
             for name, outputs in CASES for use in USES]
     text = document.table(['linkage and output', 'target', 'flash [bytes]', 'of it the C library',
-                  'RAM [bytes]', 'stack [bytes]', 'cycles or instructions, median', 'at most'],
-                          rows)
+                  'RAM [bytes]', 'stack [bytes]', 'cycles or instructions'], rows)
     text += '\n\n' + document.table(
-        ['linkage and output', 'number', *(f'{use} [ns], {what}' for use in USES
-                                           for what in ('median', 'at most'))],
-        [[f'{name} {", ".join(outputs)}', number, *(
-            value for use in USES
-            for value in times(HERE_, *prepared(name, outputs, number, use)))]
-         for name, outputs in CASES for number in ('float', 'double')])
+        ['linkage and output', *(f'{use} [ns]' for use in USES)],
+        [[f'{name} {", ".join(outputs)}', *(
+            time(HERE_, *prepared(name, outputs, 'double', use)) for use in USES)]
+         for name, outputs in CASES])
     document.show(options, 'design/c-code.md', f'{text}\n\n{document.machine()}')
 
 
 def measured(target, text, values):
-    """Return flash, that of the C library, RAM, the stack of the linkage's code, and times."""
+    """Return flash, that of the C library, RAM, the stack of the linkage's code, and the time."""
     body = values['body']
     begin = 'lkr_begin(&{name}_model, &memory);'.format(**values) if 'memory' in body else ''
     sizes = [built(target, ['--specs=nosys.specs'] * ('arm' in target.compiler) + [*extra],
@@ -176,7 +173,7 @@ def measured(target, text, values):
              for extra in ((), ('-c',)) for each in ('', body)]
     (idle, unused, _), (linked, used, _), (empty, *_), (own, _, stack) = sizes
     return [linked - idle, linked - idle - (own - empty), used - unused, stack,
-            *times(target, text, values)]
+            time(target, text, values)]
 
 
 def prepared(name, outputs, number, use):
@@ -211,8 +208,8 @@ def prepared(name, outputs, number, use):
     return header.written(mechanism, outputs, number == 'float', joints), named
 
 
-def times(target, text, values):
-    """Return the median and the longest time of a call."""
+def time(target, text, values):
+    """Return the longest time of a call."""
     with tempfile.TemporaryDirectory() as folder:
         program = compiled(Path(folder), target, target.run_flags,
                            text + (target.clock + TIMED).format(**values))
@@ -220,7 +217,7 @@ def times(target, text, values):
                                  capture_output=True)
     taken = [int(number) for number in re.findall(r'(\d{2,})\.', printed.stdout + printed.stderr)]
     assert len(taken) == POSES, printed
-    return [int(np.median(taken)), max(taken)]
+    return max(taken)
 
 
 def built(target, flags, text):

@@ -109,8 +109,7 @@ def rows():
             name, under = below(call, known)
             made = eval(f'lambda: {call}', known)
             own, *rest = times([made, *([under] if under else [])])
-            yield (page, f'`{short(call)}`', f'{own:.1f}', name, *(
-                (f'{rest[0]:.1f}', f'{own - rest[0]:.1f}') if rest else ('', '')))
+            yield page, f'`{short(call)}`', f'{own:.1f}', name, f'{rest[0]:.1f}' if rest else ''
 
 
 def main():
@@ -118,7 +117,7 @@ def main():
     options = document.parser(__doc__).parse_args()
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
-        text = document.table(('page', 'call', '[us]', 'below it', '[us]', 'more [us]'), rows())
+        text = document.table(('page', 'call', '[us]', 'below it', '[us]'), rows())
     text += '\n\n' + document.machine()
     document.show(options, 'design/performance.md', text, 'measured: calls')
 

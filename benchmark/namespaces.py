@@ -87,8 +87,8 @@ def main():
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     text = document.table(
         ['CPU time of one core [ns per pose]', 'poses',
-         *(method.title for method in METHODS), 'on a GPU'],
-        [[task.title, size, *measured(task, size), 'not measured']
+         *(method.title for method in METHODS)],
+        [[task.title, size, *measured(task, size)]
          for task in tasks() for size in SIZES])
     text += '\n\n' + document.machine('llvmlite', 'torch', 'jax')
     document.show(options, 'design/performance.md', text, 'measured: namespaces')

@@ -31,7 +31,7 @@ from .. import document
 HERE = Path(__file__).parents[1]
 # What is measured, and what of it without llvmlite, too.
 PIECES = 'one leg', '12 legs', 'four mechanisms', 'sixty mechanisms', 'changes'
-PLAIN = '12 legs', 'changes'
+PLAIN = ('12 legs',)
 # What a Python imports at its start, so that it finds no llvmlite.
 WITHOUT = "import sys\nsys.modules['llvmlite'] = None\n"
 

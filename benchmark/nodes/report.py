@@ -8,13 +8,11 @@ import statistics
 from ..document import table
 
 WITHOUT = ', without llvmlite'
-NAMES = {
-    'kinematics': 'kinematics', 'floor': 'floor: as many ready bytes',
-    'relay': 'relay: Gauss-Newton, one leg, joint states',
-    'joints': 'kinematics, joint states alone', 'unheard': 'kinematics, nobody listens',
-    'deaf': 'subscriber that does nothing'}
+# What stands beside `kinematics` with all topics subscribed.
+NAMES = {'kinematics': '', 'relay': ', relay', 'joints': ', joint states alone',
+         'unheard': ', nobody listens'}
 # What a node that publishes nothing is compared with.
-BASE = {'unheard': 'deaf', 'deaf': 'deaf'}
+BASE = {'unheard': 'deaf'}
 
 
 def titled(name, plain):
@@ -51,30 +49,32 @@ def costs(scenes):
     """Return CPU time a message and latencies of every subject."""
     lines = []
     for name, found in scenes.items():
-        cpus = {(row['rate'], row['subject']): row['cpus'] for row in found['rows']}
-        for row in found['rows']:
-            rate, subject = row['rate'], row['subject']
-            base = cpus[rate, BASE.get(subject, 'floor')]
-            lines.append([
-                f'{name}, {rate:.0f} Hz: {NAMES[subject]}', f'{row["cpu"]:.0f}',
-                f'{1e-4 * row["cpu"] * rate:.2g}', f'{ratio(row["cpus"], base):.2f}',
-                *(f'{row[x]:.0f}' if row[x] else '' for x in ('p50', 'p99')), row['lost']])
+        rows = {(row['rate'], row['subject']): row for row in found['rows']}
+        for (rate, subject), row in rows.items():
+            if subject in NAMES:
+                base = rows[rate, BASE.get(subject, 'floor')]
+                lines.append([
+                    f'{name}, {rate:.0f} Hz{NAMES[subject]}', f'{row["cpu"]:.0f}',
+                    f'{base["cpu"]:.0f}', f'{ratio(row["cpus"], base["cpus"]):.2f}',
+                    *(f'{each[x]:.0f}' if each[x] else '' for x in ('p50', 'p99')
+                      for each in (row, base)), row['lost'], base['lost']])
     return ('CPU time of the whole process, and the time from before a crank message is published '
-            'until its last joint states are received. Ratios are medians over the rounds, to the '
-            'floor; those of nodes that publish nothing to the subscriber that does nothing.\n\n'
-            + table(['all topics subscribed', 'CPU a message [us]', 'of one core [%]', 'x floor',
-                     'p50 [us]', 'p99 [us]', 'lost'], lines))
+            'until its last joint states are received; beside each the floor, where nobody '
+            'listens the subscriber that does nothing. Ratios are medians over the rounds.\n\n'
+            + table(['all topics subscribed', 'CPU a message [us]', 'floor', 'x floor', 'p50 [us]',
+                     'floor', 'p99 [us]', 'floor', 'lost', 'floor'], lines))
 
 
 def bodies(scenes):
     """Return what a callback takes."""
     lines = []
     for name, found in scenes.items():
-        ticks = {row['subject']: row['ticks'] for row in found['bodies']}
-        lines += [[f'{name}: {NAMES[row["subject"]]}', f'{row["tick"]:.0f}',
-                   f'{ratio(row["ticks"], ticks["floor"]):.2f}'] for row in found['bodies']]
+        rows = {row['subject']: row for row in found['bodies']}
+        floor = rows.pop('floor')
+        lines += [[f'{name}{NAMES[subject]}', f'{row["tick"]:.0f}', f'{floor["tick"]:.0f}',
+                   f'{ratio(row["ticks"], floor["ticks"]):.2f}'] for subject, row in rows.items()]
     return ('CPU time of its thread, one message after the other in one process.\n\n'
-            + table(['in a loop', 'callback [us]', 'x floor'], lines))
+            + table(['in a loop', 'callback [us]', 'floor', 'x floor'], lines))
 
 
 def change(pieces):
