@@ -27,7 +27,7 @@ ROOT = document.ROOT
 ROUNDS, SAMPLE = 100, 1e-3
 KINDS = {'solve': ('points', lambda x: x.points), 'velocity': ('velocities', lambda x: x.points),
          'joint_angles': ('angles', lambda x: x.joints),
-         'transmission_angles': ('transmissions', lambda x: x.structure.built.transmissions)}
+         'transmission_angles': ('transmissions', lambda x: x.formulas.built.transmissions)}
 # These and the methods of linkages are timed.
 MODULES = 'mechanisms.create', 'scene.load'
 
