@@ -132,7 +132,12 @@ def test_the_first_ten_minutes(reader):
 @pytest.mark.nightly
 def test_the_gripper_of_the_tutorial(reader):
     pytest.importorskip('matplotlib')
-    assert 'int gripper_crank_for_T_x(' in reader.follow('tutorial')
+    page, header = (DOCS / 'tutorial.md').read_text(), reader.follow('tutorial')
+    declared, call = re.findall(r'`(float .*?;)`.*`(lkr_inverse\(.*?\))`', page)[0]
+    Path('try.c').write_text(f'#include <stdio.h>\n{header}int main(void) {{ {declared} return '
+                             f'!({call} && printf("%.4f", drive)); }}')
+    subprocess.run(['cc', 'try.c', '-o', 'try', '-lm'], check=True)
+    assert subprocess.check_output('./try', text=True) == '-0.4855' and ' -0.4855 rad' in page
     assert Path('gripper.png').stat().st_size > 10_000
     # The picture at its head is of what it ends with.
     written, drawn = (yaml.safe_load(file.read_text())
