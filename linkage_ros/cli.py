@@ -95,12 +95,12 @@ def _similar_file(error: OSError) -> str:
 
 
 def chosen(mechanisms: Mapping[str, SceneMechanism], names: Sequence[str]) -> list[SceneMechanism]:
-    """Return the named mechanisms, or all; raise RequestError for an unknown name."""
+    """Return the named mechanisms, each once, or all; raise RequestError for an unknown name."""
     for name in names:
         if name not in mechanisms:
             raise RequestError(
                 f'there is no mechanism {name!r}{suggestion(name, mechanisms, 200)}')
-    return [mechanisms[name] for name in names or mechanisms]
+    return [mechanisms[name] for name in dict.fromkeys(names or mechanisms)]
 
 
 def within(kind: Callable[[str], Any], low: float, high: float) -> Callable[[str], Any]:

@@ -241,10 +241,14 @@ def test_a_part_of_neighbouring_values_is_a_series_of_numbers():
     assert np.isfinite(series.series(linkage, 'G.x', np.array([part]), False)).all()
 
 
-def test_a_series_of_too_many_pieces_is_refused():
+@pytest.mark.parametrize('line, outputs, problem', [
     # It goes up and down a thousand times.
-    with pytest.raises(ValueError, match='no inverse: .* a series of more than 10000 pieces'):
-        header.written(alone([*MOTOR, 'A crank O 1 geared crank 1000 0']), ['A.x'], single=True)
+    ('A crank O 1 geared crank 1000 0', ['A.x'], 'no inverse: .* a series of more than 10000 '),
+    # A dyad on the ground that is too short, which with one input has no reach.
+    ('A crank O 1; Q ground 9 0; B dyad O Q 1 2 left', (), 'm cannot be assembled')])
+def test_what_has_no_c_is_refused(line, outputs, problem):
+    with pytest.raises(ValueError, match=problem):
+        header.written(alone([*MOTOR, *line.split('; ')]), outputs, single=True)
 
 
 @pytest.mark.nightly(all_but=2)

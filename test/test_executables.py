@@ -88,7 +88,7 @@ def test_a_signal_ends_what_is_still_being_imported(tmp_path, name, stop):
 
 
 ARGUMENTS = [
-    (['--foo'], "unknown argument '--foo': allowed are only those of ROS, "),
+    (['--foo'], "unknown argument '--foo': .* of ROS: --ros-args --params-file SCENE"),
     (['x' * 10 ** 4], "bad arguments: unknown argument 'xxx"),
     (['--ros-args', '--bar'], 'bad arguments: .*--bar'),
     (['--ros-args', '-p', 'rate'], "bad arguments: .*Couldn't parse parameter override"),

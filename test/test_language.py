@@ -83,6 +83,7 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('R ground 0 0; P slider A 1 R along O out', 'R and O are at the same place'),
     ('R ground 0 0; P dyad R O 1 1 left', 'R and O are at the same place'),
     ('R ground 1 0; S image O R Q; P dyad S O 1 1 left', 'S and O are at the same place'),
+    ('P line A O 1; S dyad P O 2 1 left', 'P and O are at the same place'),
     ('m mirrored O A', 'joint A must be on the ground'),
     ('m mirrored O O', 'the joints that it is placed from must differ'),
     ('9 mirrored O Q', "'9' cannot name a joint"),

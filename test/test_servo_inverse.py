@@ -120,7 +120,7 @@ INPUTS_REFUSED = [
       for bad in (1e9, -1e9, math.nan)),
     ({'outputs': ['P.x']}, 'leg has 2 inputs: as many outputs are needed, not 1'),
     ({'outputs': ['P.x', 'P.x']},
-     'P.x, P.x do not determine all inputs: too few of them move P.x, P.x'),
+     'outputs must differ, got P.x, P.x'),
     ({'mechanism': 'drop'}, 'drop has 1 input: as many outputs are needed, not 2')]
 
 

@@ -141,7 +141,7 @@ def test_an_input_that_is_held_is_held_in_its_own_turn(hung, seed):
     (None, [0.1, 0.1], 'outputs must be a list of names, got None'),
     (('P.x', 7), [0.1, 0.1], 'five_bar has no output 7; allowed: '),
     (({}, 'P.x'), [0.1, 0.1], 'five_bar has no output {}; allowed: '),
-    (('P.x', 'P.x'), [0.1, 0.1], 'inputs: too few of them move P.x, P.x'),
+    (('P.x', 'P.x'), [0.1, 0.1], 'outputs must differ, got P.x, P.x'),
     (('A.x', 'crank'), [0.1, 0.1], 'inputs: too few of them move A.x, crank'),
     (('P.x', 'O.x'), [0.1, 0.1], 'P.x, O.x do not determine all inputs: too few of them move O.x'),
     (('P.x', 'P.y'), [0.1], r'values must be as many numbers, got \[0.1\]'),

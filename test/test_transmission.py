@@ -511,8 +511,10 @@ def test_a_package_is_written_again(tmp_path, capsys):
     files = package('leg_transmissions', 'leg.yaml', [
         (mechanism, ['knee'] * (name == 'knee')) for name in chosen
         for mechanism in [scene.load(path).mechanisms[name]]])
+    written(tmp_path, path)
+    capsys.readouterr()
     for _ in range(2):
-        made = written(tmp_path, path, '--mechanism', *chosen, '--joints', 'knee')
+        made = written(tmp_path, path, '--mechanism', *chosen, 'hip', '--joints', 'knee')
         assert capsys.readouterr().out == f'{made}: knee, hip; see urdf/transmissions.xml\n'
         assert {file.relative_to(made): file.read_text() for file in made.rglob('*')
                 if file.is_file()} == files

@@ -16,7 +16,8 @@ from .names import comment
 from ..formula.expression import Real
 from ..formula.operations import OPERATIONS
 from ..formula.program import Dialect, Program, tolerant
-from ..linkage import IN_SINGLE, Mechanism
+from ..linkage import IN_SINGLE
+from ..scene import SceneMechanism
 
 # Names of constants, arguments and values.
 _NAMED = re.compile(r'\b[kx]\d+\b')
@@ -35,19 +36,19 @@ class _Call(str):
 
 class Code:
     """
-    Writes C for one linkage.
+    Writes C for one mechanism.
 
     Parameters
     ----------
-    linkage : Mechanism
-        The linkage.
+    mechanism : SceneMechanism
+        The mechanism.
     single : bool
         Whether it computes with float instead of double.
 
     """
 
-    def __init__(self, linkage: Mechanism, single: bool = False):
-        self.linkage, self.single = linkage, single
+    def __init__(self, mechanism: SceneMechanism, single: bool = False):
+        self.name, self.linkage, self.single = mechanism.name, mechanism.linkage, single
         self.number, suffix = ('float', 'f') if single else ('double', '')
         # Tolerances have the rounding of the type.
         self._rounding: Mapping[Any, float] = IN_SINGLE if single else {}
@@ -57,7 +58,9 @@ class Code:
                 self.literal(self._rounding.get(value, value)))
 
     def literal(self, value: float) -> str:
-        """Return a number in C."""
+        """Return a number in C; raise ValueError if a length makes it NaN, at any input."""
+        if value != value:
+            raise ValueError(f'{self.name} cannot be assembled with its lengths')
         if abs(value) > (3.4e38 if self.single else sys.float_info.max):
             return '-INFINITY' if value < 0.0 else 'INFINITY'
         if not self.single:

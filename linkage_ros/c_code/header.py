@@ -81,7 +81,7 @@ def headers(requests: Sequence[Request], single: bool, common: Sequence[str]) ->
 def _values(request: Request, single: bool) -> dict[str, Any]:
     """Return the values of the template of a header."""
     mechanism, linkage = request.mechanism, request.mechanism.linkage
-    name, code = mechanism.name, Code(linkage, single)
+    name, code = mechanism.name, Code(mechanism, single)
     sides = actuators(mechanism), joints(mechanism, request.joints)
     inverses = _inverses(mechanism, request.outputs)
     formulas = Formulas(mechanism, code, [

@@ -32,16 +32,22 @@ def write(args: list[str] | None) -> None:
         files = package(out.name, Path(options.scene).name, mechanisms)
     except ValueError as error:
         raise cli.RequestError(str(error)) from None
-    xml = out / 'package.xml'
-    is_ours = xml.is_file() and 'written by linkage_ros' in xml.read_text(errors='replace')
-    if out.exists() and any(out.iterdir()) and not is_ours:
+    if out.exists() and any(out.iterdir()) and not _is_ours(out / 'package.xml'):
         raise cli.RequestError('--out must be a new folder, or one written by this command, but '
                                f'{out} has other files')
+    for path in filter(_is_ours, out.glob('src/*_linkage.h')):
+        # Of a mechanism that may be chosen no longer.
+        path.unlink()
     for path, text in files.items():
         (out / path).parent.mkdir(parents=True, exist_ok=True)
         (out / path).write_text(text, encoding='utf-8')
     names = ', '.join(mechanism.name for mechanism, _ in mechanisms)
     print(f'{out}: {names}; see urdf/transmissions.xml')
+
+
+def _is_ours(path: Path) -> bool:
+    """Return whether this command wrote a file."""
+    return path.is_file() and 'written by linkage_ros' in path.read_text(errors='replace')
 
 
 def arguments() -> cli.Parser:

@@ -246,7 +246,7 @@ def run(node_classes: Iterable[Callable[[], Node]], name: str, args: Any = None,
             rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
             if unknown := remove_ros_args(args)[1:]:
                 raise scenes.SceneError(f'unknown argument {short_repr(unknown[0])}: allowed are '
-                                        'only those of ROS, after --ros-args')
+                                        'only those of ROS: --ros-args --params-file SCENE')
         except (RuntimeError, scenes.SceneError) as error:
             # The message of rclpy may quote a long argument.
             try_shutdown()

@@ -423,18 +423,19 @@ class Builder:
     def _constant(self, first: str, second: str) -> _Vector | None:
         """Return the vector between two joints; None if they are of two links."""
         ends = self.points[first], self.points[second]
+        side = self._vectors.get((first, second))
         if ends[0].link == ends[1].link == GROUND:
             vector = ends[1].place - ends[0].place
-            self.require(vector.length(), f'{first} and {second} are at the same place')
-            return _Vector(vector, vector.length(), GROUND)
-        if (first, second) not in self._vectors:
-            for link, frame in self.frames.items():
-                if first in frame and second in frame:
-                    bar, across = self.directions[link], frame[second] - frame[first]
-                    self._vectors[first, second] = _Vector(
-                        bar.vector * (across / bar.length), across.length(), link)
-                    break
-        return self._vectors.get((first, second))
+            side = _Vector(vector, vector.length(), GROUND)
+        for link, frame in () if side else self.frames.items():
+            if first in frame and second in frame:
+                bar, across = self.directions[link], frame[second] - frame[first]
+                side = self._vectors[first, second] = _Vector(
+                    bar.vector * (across / bar.length), across.length(), link)
+                break
+        if side:
+            self.require(side.length, f'{first} and {second} are at the same place')
+        return side
 
     def spot(self, link: str, seen: Complex) -> Complex:
         """Return the place of a point that a link carries, from where it lies on the link."""

@@ -127,6 +127,8 @@ class Inverse:
 
     def __init__(self, linkage: Kinematics, outputs: tuple[str, ...]):
         self.linkage, self.outputs, self._n = linkage, outputs, len(outputs)
+        if len({*outputs}) < len(outputs):
+            raise ValueError(f'outputs must differ, got {join_names(outputs)}')
         if len(outputs) != len(linkage.inputs):
             raise ValueError(f'{linkage.type} has {n_inputs(len(linkage.inputs))}: as many '
                              f'outputs are needed, got {join_names(outputs)}')
