@@ -244,8 +244,8 @@ def read_mechanism(name: str, entries: Mapping[str, Any],
     inputs = {input_.name: read_settings(name, linkage, input_, reach, scale, values)
               for input_, reach in zip(linkage.inputs, reaches)}
     frame_id, only_named = take('frame_id', FRAME), take('only_named', ONLY_NAMED)
-    joints = read_joint_names(
-        name, linkage, leg_pairs, mirrored, take('joint_names', JOINT_NAMES), only_named)
+    joints = dict(read_joint_names(
+        name, linkage, leg_pairs, mirrored, take('joint_names', JOINT_NAMES), only_named))
     loads = read_loads(name, linkage, take('loads', LOADS))
     if loads and (leg_pairs > 1 or mirrored):
         raise SceneError(f'{name}.loads must be empty for more than one leg')
