@@ -175,6 +175,11 @@ def test_where_the_way_leads_out_of_the_sweep_one_input_jumps_into_it():
             near(InverseRequest(mechanism, ['block']).command(
                 [0.5 * block], None, [near_], jumps).inputs, [expected])
         near(mechanism.follow(['block'], [0.5 * block], [near_])[0][0], expected)
+        # An end of the sweep is an answer, however the output is rounded.
+        answers = [InverseRequest(mechanism, ['block']).answers(
+            [0.5 * block * (1.0 + rounding)], [near_]) for rounding in (-2e-16, 0.0, 2e-16)]
+        near([[found for (found,), _ in some[:1]] for some in answers],
+             3 * [[expected] * math.isfinite(expected)])
 
 
 @pytest.mark.parametrize('scale', [0.5, 4.0])

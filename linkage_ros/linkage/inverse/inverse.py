@@ -173,7 +173,8 @@ class Inverse:
 
     # --- all solutions ---
 
-    def all(self, values: ArrayLike, near: ArrayLike | None = None) -> list[Solution]:
+    def all(self, values: ArrayLike, near: ArrayLike | None = None, ends: Ends = None
+            ) -> list[Solution]:
         """
         Return all solutions for one value of each output.
 
@@ -185,6 +186,8 @@ class Inverse:
         near : array-like (inputs,), optional
             Values of the inputs [rad or m]. Whole turns are added to the solutions to bring them
             nearest to it, and the nearest comes first; the unit of a length is about its stroke.
+        ends : sequence of (float, float) or None, optional
+            For each input the range [rad or m] that the solutions have to lie in, or None.
 
         Returns
         -------
@@ -196,16 +199,18 @@ class Inverse:
         Raises
         ------
         ValueError
-            If there is not one value for each output, and one finite `near` for each input.
+            If there is not one value for each output, and one finite `near` for each input, or
+            ends are not finite and in order.
 
         """
         seed = () if near is None else self._numbers(near, 'near', finite=True)
-        solutions = [row[:self._n] for row in self._all(self._numbers(values), seed)]
+        limits, sizes = checked_ends(self._n, ends), self.problem.sizes
+        placed = [self._choice.of([row], seed, limits)
+                  for row in self._all(self._numbers(values), seed)]
+        solutions = [tuple(row[:self._n]) for row in placed if row[0] == row[0]]
         if seed:
-            solutions = sorted(
-                (self.problem.nearest_equivalent(inputs, seed) for inputs in solutions),
-                key=lambda inputs: math.dist(np.divide(inputs, self.problem.sizes),
-                                             np.divide(seed, self.problem.sizes)))
+            solutions.sort(key=lambda inputs: math.dist(
+                np.divide(inputs, sizes), np.divide(seed, sizes)))
         return [Solution(inputs, self) for inputs in solutions]
 
     def over(self, *values: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
