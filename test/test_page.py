@@ -144,7 +144,9 @@ def test_a_slider_sets_the_nodes_and_a_refusal_springs_back_and_is_forgotten(sta
     until(lambda: re.match(r'Refused: 7000000 mm; the slider goes from -\S+ to \S+ mm\.',
                            seen.reason('lever', 'e')))
     seen.type('lever', 'speed', '7200')
-    until(lambda: 'from -5729.58 to 5729.58, not 7200' in seen.reason('lever', 'speed'))
+    until(lambda: re.match(r'Refused: 7200 °/s; the slider goes from -5729.58 to 5729.58 °/s\. '
+                           r'\S+ must be .* from -100 to 100 \[rad/s\], not 125\.6637',
+                           seen.reason('lever', 'speed')))
     seen.value('workshop.click()')
     for good in ('150', '151', ''):
         seen.type('lever', 'b', '-150')

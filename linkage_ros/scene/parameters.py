@@ -126,6 +126,8 @@ class Field:
             words.append('above 0')
         if self.high is not None:
             words.append(f'from {self.low:g} to {self.high:g}')
+        if self.unit:
+            words.append(f'[{self.unit}]')
         return ' '.join(words) + (self.rule and f', {self.rule}')
 
     def checked(self, name: str, value: Any) -> Any:

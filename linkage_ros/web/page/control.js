@@ -155,15 +155,8 @@ export class Slider {
     if (!refused) this.accepted = value;
     const [wanted, low, high] = [requested, this.low, this.high].map(number => this.shortened(number));
     const unit = this.unitShown.textContent;
-    this.explain(refused ? `Refused: ${wanted} ${unit}; the slider goes from ${low} to ${high} ${unit}. ${this.translated(reason)}` : reason, refused);
+    this.explain(refused ? `Refused: ${wanted} ${unit}; the slider goes from ${low} to ${high} ${unit}. ${reason}` : reason, refused);
     if (!this.gesture && !this.requests.waiting) this.render();
-  }
-
-  /** A node's rule with its numbers and its unit as they are displayed. */
-  translated(reason) {
-    return reason.replace(/ must .*/s, rule => rule
-      .replace(/(?<![\w.])-?\d+(\.\d+)?(e[-+]?\d+)?(?!\w)/g, number => this.shortened(Number(number)))
-      .replace(`] ${this.unit},`, `] ${this.unitShown.textContent},`));
   }
 
   explain(words, refused) {
