@@ -74,11 +74,8 @@ class Scene:
     def changed_from(self, old: 'Scene') -> list[Parameter]:
         """Return the parameters whose values differ from an older scene of the same mechanisms."""
         # No change adds or removes a parameter.
-        parts = [(self.general, old.general), *(
-            (mechanism.parameters, old.mechanisms[name].parameters)
-            for name, mechanism in self.mechanisms.items())]
-        return [parameter for part, before in parts if part is not before
-                for parameter, other in zip(part, before) if parameter.value != other.value]
+        return [parameter for parameter, before in zip(self.parameters, old.parameters)
+                if parameter.value != before.value]
 
 
 def load(path: str) -> Scene:

@@ -116,10 +116,15 @@ def in_words(arcs: Iterable[Arc]) -> str:
     return truncated(' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in arcs), MAX_ARCS)
 
 
-def read_settings(name: str, linkage: Mechanism, input_: Input, reach: tuple[Arc, ...],
-                  scale: float, values: Values) -> InputSettings:
+def reach_of(linkage: Mechanism, input_: Input) -> tuple[Arc, ...]:
+    """Return the reach of an input [rad or m]; that of one of several depends on the others."""
+    return ((input_.low, input_.high),) if len(linkage.inputs) > 1 else tuple(linkage.reach())
+
+
+def read_settings(name: str, linkage: Mechanism, input_: Input, scale: float, values: Values
+                  ) -> InputSettings:
     """Read the settings of an input; its lengths are those of the linkage times `scale`."""
-    key, default_speed = input_.name, 1.0
+    key, default_speed, reach = input_.name, 1.0, reach_of(linkage, input_)
     if not input_.is_angle:
         input_ = input_._replace(low=scale * input_.low, high=scale * input_.high)
         reach = tuple((scale * low, scale * high) for low, high in reach)

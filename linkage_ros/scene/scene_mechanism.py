@@ -12,7 +12,7 @@ import math
 import re
 from typing import Any, Mapping, Sequence
 
-from .input_settings import InputSettings, read_settings
+from .input_settings import InputSettings, reach_of, read_settings
 from .joint_names import JointName, read_joint_names
 from .legs import LegGroup
 from .loads import Load, read_loads
@@ -77,16 +77,14 @@ class SceneMechanism:
     """
     A mechanism of a scene, which has one or more equal legs.
 
-    `linkage` is that of a leg, and `reach` the reach of its first input, both before `scale`, a
-    factor of all lengths. `points` are the joints that markers display; `pose` is x, y, z [m],
-    roll, pitch, yaw [rad] in `frame_id`, or in the scene's frame if that is empty. `inputs` are by
-    their names; `joints` are the published names by joint; `loads` are forces by joint, moments by
-    link.
+    `linkage` is that of a leg before `scale`, a factor of all lengths. `points` are the joints
+    that markers display; `pose` is x, y, z [m], roll, pitch, yaw [rad] in `frame_id`, or in the
+    scene's frame if that is empty. `inputs` are by their names; `joints` are the published names
+    by joint; `loads` are forces by joint, moments by link.
     """
 
     name: str
     linkage: Mechanism
-    reach: tuple[Arc, ...]
     scale: float
     leg_pairs: int
     mirrored: bool
@@ -217,7 +215,7 @@ class SceneMechanism:
 
     def assembly(self) -> LegGroup:
         """Return the solver of all legs."""
-        return LegGroup(self.linkage, self.leg_pairs, self.mirrored, self.scale, self.reach)
+        return LegGroup(self.linkage, self.leg_pairs, self.mirrored, self.scale)
 
     @property
     def tracer(self) -> str:
@@ -235,14 +233,14 @@ def read_mechanism(name: str, entries: Mapping[str, Any],
     """Read a mechanism from its values by full parameter name, other values as `before`."""
     values = Values(entries, f'{name}.', before.parameters if before else ())
     take = values.take
-    linkage, reaches = _linkage(name, take('type', TYPE, name), values)
+    linkage = _linkage(name, take('type', TYPE, name), values)
     scale, (leg_pairs, mirrored) = take('scale', SCALE), _legs(name, linkage, values)
     points = take('points', POINTS.about(
         rule=f'some of {join_names(linkage.points)}, each once', choices=linkage.points),
         linkage.points)
     pose = take('pose', POSE)
-    inputs = {input_.name: read_settings(name, linkage, input_, reach, scale, values)
-              for input_, reach in zip(linkage.inputs, reaches)}
+    inputs = {input_.name: read_settings(name, linkage, input_, scale, values)
+              for input_ in linkage.inputs}
     frame_id, only_named = take('frame_id', FRAME), take('only_named', ONLY_NAMED)
     joints = dict(read_joint_names(
         name, linkage, leg_pairs, mirrored, take('joint_names', JOINT_NAMES), only_named))
@@ -250,12 +248,11 @@ def read_mechanism(name: str, entries: Mapping[str, Any],
     if loads and (leg_pairs > 1 or mirrored):
         raise SceneError(f'{name}.loads must be empty for more than one leg')
     values.refuse_unknown()
-    return SceneMechanism(name, linkage, reaches[0], scale, leg_pairs, mirrored, points, pose,
-                          inputs, frame_id, joints, only_named, loads, tuple(values.parameters))
+    return SceneMechanism(name, linkage, scale, leg_pairs, mirrored, points, pose, inputs,
+                          frame_id, joints, only_named, loads, tuple(values.parameters))
 
 
-def _linkage(name: str, type_: str, values: Values) -> tuple[Mechanism, list]:
-    """Read a linkage; return it and the reach of each input."""
+def _linkage(name: str, type_: str, values: Values) -> Mechanism:
     try:
         design = mechanisms.design(type_) if type_ in mechanisms.TYPES else mechanisms.design(
             type_, values.take('joints', JOINTS), values.take('tracer', TRACER) or None,
@@ -269,16 +266,13 @@ def _linkage(name: str, type_: str, values: Values) -> tuple[Mechanism, list]:
                 for key, sign in design.branches.items()}
     try:
         linkage = _built(design, tuple(dimensions.items()), tuple(branches.items()))
-        # The reach of one of several inputs depends on the others.
-        reaches = [((input_.low, input_.high),) for input_ in linkage.inputs]
-        if len(reaches) == 1:
-            reaches = [tuple(linkage.reach())]
+        reaches = [reach_of(linkage, input_) for input_ in linkage.inputs]
     except ValueError as error:
         raise SceneError(f'{name}.dimensions: {error}') from None
-    if not reaches[0]:
+    if not all(reaches):
         raise SceneError(f'{name}.{"dimensions" if dimensions else "joints"} must let the {type_} '
                          f'be assembled at some {linkage.inputs[0].kind}')
-    return linkage, reaches
+    return linkage
 
 
 @cached(16, shared=True)
