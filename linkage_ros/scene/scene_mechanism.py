@@ -152,11 +152,9 @@ class SceneMechanism:
         inverse = self.linkage.inverse(tuple(outputs))
         targets, seeds = divided(values, units), divided(seed, scales)
         inputs: Sequence[float]
-        inputs, rates = inverse.follow(targets, seeds)
-        if not all(end[0] <= value <= end[1] if end else value == value
-                   for end, value in zip(self.ends, inputs)):
-            inputs, rates = inverse.nearest(targets, seeds, self.ends) if jumps else (
-                [math.nan] * len(seeds), rates)
+        inputs, rates = inverse.follow(targets, seeds, self.ends)
+        if jumps and not math.isfinite(inputs[0]):
+            inputs, rates = inverse.nearest(targets, seeds, self.ends)
         return ([input_ * scale for input_, scale in zip(inputs, scales)],
                 [rate * unit / scale for rate, (scale, unit) in zip(
                     rates, product(scales, units))])
