@@ -82,7 +82,6 @@ class OutputRow {
   }
 
   render() {
-    if (!this.output) return;
     const { value, unit, rates } = this.output;
     if (document.activeElement !== this.value) put(this.value, { [this.editable ? 'value' : 'textContent']: shown(value, unit, FIGURES) });
     put(this.unit, { textContent: units.of(unit).name });
@@ -149,7 +148,6 @@ export class Motion {
     if (names !== this.built) this.build(names, inputs, outputs);
     for (const [name, value] of Object.entries(inputs)) this.inputs.get(name).show(this.mechanism.inputs[name], value);
     this.onshow();
-    if (!this.folding.open) return;
     for (const [name, output] of Object.entries(outputs)) this.outputs.get(name).show(output, Object.values(this.mechanism.inputs));
   }
 
