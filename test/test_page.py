@@ -472,9 +472,12 @@ def test_a_plot_is_not_drawn_through_a_pole_and_fits_any_window(start):
 @pytest.mark.nightly
 def test_arrows_are_asked_for_wherever_their_mechanism_s_part_of_the_panel_is(start):
     _, seen = start(LEVER)
-    # Outputs that are folded have their values when they are opened.
-    assert math.isfinite(seen.output('lever', 'lever'))
-    assert not seen.value(f'{seen.section("lever")}.querySelector("details:has(table)").open')
+    # Outputs have their values at once when they are unfolded.
+    folded = f'{seen.section("lever")}.querySelector("details:has(table):not([open])")'
+    seen.becomes(f'!!{folded}.querySelector("td input")')
+    assert seen.value(f'(folding => new Promise(done => {{ folding.open = true; folding.'
+                      f'addEventListener("toggle", () => done(folding.querySelector("td input")'
+                      f'.value)); }}))({folded})')
     seen.resize(1200, 200, 'light')
     seen.value("""(() => {
         const { send } = WebSocket.prototype;

@@ -68,8 +68,6 @@ class InputSettings:
         Intervals of the input in which the linkage can be assembled.
     speed : float
         Speed of the motion [rad/s or m/s].
-    default_speed : float
-        Its default [rad/s or m/s]: 1 rad/s, or a stroke in three seconds.
     start : float
         Initial value of the motion; outside the sweep, this begins at its nearer end.
     sweep : (float, float), optional
@@ -91,7 +89,6 @@ class InputSettings:
     input: Input
     reach: tuple[Arc, ...]
     speed: float
-    default_speed: float
     start: float
     sweep: Arc | None
     ends: Arc | None
@@ -154,6 +151,6 @@ def read_settings(name: str, linkage: Mechanism, input_: Input, scale: float, va
     if not ends and not is_whole:
         low, high = next((arc for arc in reach if input_.holds(arc, start, start)), reach[0])
         sweep = low + SWEEP_MARGIN * (high - low), high - SWEEP_MARGIN * (high - low)
-    return InputSettings(input_, reach, speed, default_speed, start, sweep, ends,
+    return InputSettings(input_, reach, speed, start, sweep, ends,
                          source or f'{name}_{measures or key}', take('ratio', RATIO),
                          take('offset', OFFSET), measures)

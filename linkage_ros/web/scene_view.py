@@ -276,9 +276,10 @@ class SceneView:
 
     def _playing(self, shown: ShownMechanism) -> dict[str, float]:
         """Return the speeds of a mechanism when it plays: the last ones that were not zero."""
-        return {name: self._speeds[shown.owner].get(
-            f'{shown.name}.{name}.speed', settings.default_speed)
-            for name, settings in self._mechanism(shown).inputs.items()}
+        speeds = self._speeds[shown.owner]
+        return {parameter.name.split('.')[1]: speeds.get(parameter.name, parameter.default)
+                for parameter in self._mechanism(shown).parameters
+                if parameter.field.group == 'speeds'}
 
     async def _watch(self) -> None:
         """Observe the graph until the last page is closed."""
