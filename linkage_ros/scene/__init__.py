@@ -41,7 +41,7 @@ GENERAL = {
         rule='1 to 100 characters that can be seen, the first a letter, digit or _'),
     'frame_prefix': replace(FRAME, meaning='Prefix of the frames of markers and loci, as in '
                                            'robot_state_publisher.'),
-    'rate': Field('double', 'Rate of crank messages [Hz]; 0: none.', 0.0, 1000.0, default=50.0,
+    'rate': Field('double', 'Rate of crank messages [Hz]; 0: none.', (0.0, 1000.0), default=50.0,
                   readers=(DRIVER,), unit='Hz')}
 
 

@@ -34,7 +34,7 @@ def is_ratio(ratio: float) -> bool:
     return 1e-30 <= abs(ratio) <= 1e30
 
 
-SPEED = Field('double', 'Speed of the {0} [{unit}].', -MAX_SPEED, MAX_SPEED, readers=(DRIVER,),
+SPEED = Field('double', 'Speed of the {0} [{unit}].', (-MAX_SPEED, MAX_SPEED), readers=(DRIVER,),
               unit='{1}/s', group='speeds')
 START = Field('double', 'Initial value of the {0} [{unit}]; a new value moves it there.',
               default=0.0, readers=(DRIVER,), unit='{1}', group='starts')
@@ -132,9 +132,9 @@ def read_settings(name: str, linkage: Mechanism, input_: Input, scale: float, va
         return values.take(f'{key}.{setting}', field.about(key, input_.unit, **about), default)
 
     is_whole = input_.is_whole(reach)
-    farthest = max(MAX_START, input_.high) if input_.is_angle else None
+    farthest = max(MAX_START, input_.high)
     speed = take('speed', SPEED, default_speed)
-    start = take('start', START, low=farthest and -farthest, high=farthest)
+    start = take('start', START, ends=(-farthest, farthest) if input_.is_angle else None)
     sweep = ends = take('sweep', SWEEP) or None
     source, measures = take('source', SOURCE), take('measures', MEASURES)
     if ends and not is_whole and not any(input_.holds(arc, *ends) for arc in reach):

@@ -80,7 +80,6 @@ class InverseRequest:
         self._mechanism, self._settings = mechanism, list(mechanism.inputs.values())
         self.outputs = [output or LEVER for output in outputs]
         self.inverse = mechanism.linkage.inverse(tuple(self.outputs))
-        self.units = [settings.input.unit for settings in self._settings]
         self._units, self._scales = [*map(mechanism.scale_of, self.outputs)], mechanism.scales
         self._actuators = [settings.actuator for settings in self._settings]
         # Factors of the linkage's rates: of each output by the first actuator, by the second, ...

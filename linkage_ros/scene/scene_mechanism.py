@@ -42,12 +42,12 @@ TRACER = Field('string', 'Joint whose curve is the locus; empty: the last.', def
                read_only=True)
 DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [{unit}].', unit='m',
                   group='dimensions')
-BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the default.', -1, 1,
+BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the default.', (-1, 1),
                group='branches')
 SCALE = Field('double', 'Factor of every length.', default=1.0, positive=True)
 # The inverse uses no legs and no `only_named`, but loads and names are valid or not by them.
-LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.', 1, 50,
-                  default=1, readers=(KINEMATICS, INVERSE))
+LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.',
+                  (1, 50), default=1, readers=(KINEMATICS, INVERSE))
 MIRRORED = Field('bool', 'Whether each leg has a mirror image on the other side; '
                  'default: with more than one pair.', readers=(KINEMATICS, INVERSE))
 POINTS = Field('string_array', 'Joints that markers display.', readers=(KINEMATICS,),
