@@ -6,7 +6,7 @@
 import math
 from pathlib import Path
 
-from linkage_ros import mechanisms
+from linkage_ros import mechanisms, scene
 from linkage_ros.mechanisms.four_bar import grashof
 from linkage_ros.scene.legs import LegGroup
 import numpy as np
@@ -51,6 +51,17 @@ def test_the_defaults_are_those_of_the_sources_and_only_offsets_may_be_negative(
             with pytest.raises(ValueError, match=(
                     f'^{kind}: dimension {name} must be positive, got {wrong}$')):
                 mechanisms.create(kind, **{name: wrong})
+
+
+def test_nobody_changes_what_others_use():
+    linkage = mechanisms.create('jansen')
+    for shared in (linkage.design.dimensions, linkage.design.branches,
+                   linkage.frames['BC'], linkage.yokes, mechanisms.CATALOGUE):
+        with pytest.raises(TypeError):
+            shared['m'] = 1.0
+    assert isinstance(linkage.design.lines, tuple)
+    scene.read({}).mechanisms['jansen'].joints.clear()
+    assert scene.read({}).mechanisms['jansen'].joints
 
 
 def test_the_scene_without_names_is_of_the_size_of_a_table():

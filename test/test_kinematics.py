@@ -35,8 +35,9 @@ UNASSEMBLED = [
         'O ground 0 0', 'P ground 1 0', 'B cylinder P O 1 left', 'Q crank B 1 zero O',
         'D cylinder O Q 1 left']}, [9.0, 0.3, 25.0],
      ' 9 m, crank angle 0.3 rad, cylinder2 length 25 m: no place for "D cylinder O Q 1 left"'),
-    (ANKLE, [0.3, 0.3], '"pitch hinge ground at 0 0 0 axis 0 1 0 within -50deg 30deg", '
-     '"roll hinge pitch at 0 0 -0.0176 axis 1 0 0 within -15deg 15deg"'),
+    ({**ANKLE, 'joints': [line.replace(' within', '\twithin') for line in ANKLE['joints']]},
+     [0.3, 0.3], '"pitch hinge ground at 0 0 0 axis 0 1 0\twithin -50deg 30deg", '
+     '"roll hinge pitch at 0 0 -0.0176 axis 1 0 0\twithin -15deg 15deg"'),
     ({'type': 'custom', 'joints': BOOM, 'scale': 2.0}, [9.0],
      '{m} cannot be assembled at cylinder length 9 m; the reach is [1.12297, 3.27703] m'),
     ({'type': 'four_bar'}, [math.nan], '{m} cannot be assembled: {m}_crank is at nan'),

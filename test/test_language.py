@@ -482,10 +482,13 @@ def seen(places, first='O', second='H'):
                 for name, place in at.items()}
 
 
-@pytest.mark.parametrize('up', ['', ' up'])
-def test_every_construction_has_its_image(up):
+@pytest.mark.parametrize('up, others', [('', ''), (' up', ''), ('', 'BSLF')])
+def test_every_construction_has_its_image(up, others):
     lines = [line + up if line == 'A crank K 0.2' else line for line in ALL]
-    linkage = mechanisms.create('custom', joints=lines)
+    drawn = mechanisms.design('custom', lines).branches
+    assert [*drawn] == ['B', 'S', 'L', 'F']
+    linkage = mechanisms.create('custom', joints=lines, branches={
+        name: -drawn[name] for name in others})
     assert [input_.name for input_ in linkage.inputs] == ['carriage', 'crank', 'crank2']
     count = 0
     for values in np.random.default_rng(3).uniform((0.15, -3.0, -3.0), (0.55, 3.0, 3.0), (40, 3)):

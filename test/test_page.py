@@ -144,7 +144,9 @@ def test_a_slider_sets_the_nodes_and_a_refusal_springs_back_and_is_forgotten(sta
     until(lambda: re.match(r'Refused: 7000000 mm; the slider goes from -\S+ to \S+ mm\.',
                            seen.reason('lever', 'e')))
     seen.type('lever', 'speed', '7200')
-    until(lambda: 'from -5729.58 to 5729.58, not 7200' in seen.reason('lever', 'speed'))
+    until(lambda: re.match(r'Refused: 7200 °/s; the slider goes from -5729.58 to 5729.58 °/s\. '
+                           r'\S+ must be .* from -100 to 100 \[rad/s\], not 125\.6637',
+                           seen.reason('lever', 'speed')))
     seen.value('workshop.click()')
     for good in ('150', '151', ''):
         seen.type('lever', 'b', '-150')
@@ -470,6 +472,12 @@ def test_a_plot_is_not_drawn_through_a_pole_and_fits_any_window(start):
 @pytest.mark.nightly
 def test_arrows_are_asked_for_wherever_their_mechanism_s_part_of_the_panel_is(start):
     _, seen = start(LEVER)
+    # Outputs have their values at once when they are unfolded.
+    folded = f'{seen.section("lever")}.querySelector("details:has(table):not([open])")'
+    seen.becomes(f'!!{folded}.querySelector("td input")')
+    assert seen.value(f'(folding => new Promise(done => {{ folding.open = true; folding.'
+                      f'addEventListener("toggle", () => done(folding.querySelector("td input")'
+                      f'.value)); }}))({folded})')
     seen.resize(1200, 200, 'light')
     seen.value("""(() => {
         const { send } = WebSocket.prototype;

@@ -104,8 +104,7 @@ def test_every_parameter_is_described_as_the_scene_has_it(graph, kind):
     abouts, types = Client(graph, node).about(names)
     assert len(abouts) == len(types) == len(own)
     for one, about, type_ in zip(own, abouts, types):
-        kind, ends = Parameter.Type[one.field.kind.upper()].value, (
-            one.field.high is not None and (one.field.low, one.field.high))
+        kind, ends = Parameter.Type[one.field.kind.upper()].value, one.field.ends
         assert scene.plain(node.get_parameter(one.name).value) == one.value
         assert type_ == kind
         assert about == msg.ParameterDescriptor(

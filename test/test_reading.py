@@ -8,7 +8,6 @@ import math
 import struct
 from types import FunctionType, ModuleType
 
-from linkage_ros.cache import Cache
 from linkage_ros.nodes import message_layout
 from linkage_ros.nodes.message_layout import MIN_BYTES, Unreadable
 import numpy as np
@@ -101,11 +100,11 @@ def test_a_sender_whose_first_number_is_none_is_learnt(reader):
 
 
 def held(owner):
-    """Return how many objects an object holds, itself and by way of others; caches have an end."""
+    """Return how many objects an object holds, itself and by way of others."""
     found, waiting = {}, [owner]
     while waiting:
         one = waiting.pop()
-        if id(one) not in found and not isinstance(one, (type, FunctionType, ModuleType, Cache)):
+        if id(one) not in found and not isinstance(one, (type, FunctionType, ModuleType)):
             found[id(one)] = one
             waiting.extend(gc.get_referents(one))
     return len(found)

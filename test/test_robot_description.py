@@ -78,6 +78,19 @@ def test_whoever_comes_late_hears_the_description_once(graph):
     assert len(heard) == len(whole) == 2
     assert all('xyz="1.0 0.0 0.0"' in texts[1].data for texts in (heard, whole))
 
+    def publishers():
+        return [str(info.endpoint_gid)
+                for info in graph.node.get_publishers_info_by_topic('robot_description')]
+
+    # Of a scene that has no robot any more, nobody hears the last one.
+    before = publishers()
+    assert graph.set(node, jansen__only_named=True).successful
+    graph.until(lambda: publishers() not in ([], before))
+    late = graph.listen(String, 'robot_description', LATCHED)
+    assert graph.set(node, jansen__only_named=False).successful
+    graph.until(lambda: late and len(whole) == 3)
+    assert len(late) == 1
+
 
 FILES = {'rate.yaml': 'rate: 5.0\n', 'empty.yaml': '',
          'foreign.yaml': '/another_node:\n  ros__parameters:\n    rate: 5.0\n',

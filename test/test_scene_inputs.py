@@ -175,6 +175,11 @@ def test_where_the_way_leads_out_of_the_sweep_one_input_jumps_into_it():
             near(InverseRequest(mechanism, ['block']).command(
                 [0.5 * block], None, [near_], jumps).inputs, [expected])
         near(mechanism.follow(['block'], [0.5 * block], [near_])[0][0], expected)
+        # An end of the sweep is an answer, however the output is rounded.
+        answers = [InverseRequest(mechanism, ['block']).answers(
+            [0.5 * block * (1.0 + rounding)], [near_]) for rounding in (-2e-16, 0.0, 2e-16)]
+        near([[found for (found,), _ in some[:1]] for some in answers],
+             3 * [[expected] * math.isfinite(expected)])
 
 
 @pytest.mark.parametrize('scale', [0.5, 4.0])
@@ -194,6 +199,11 @@ def test_several_inputs_jump_only_if_they_may(scale):
             near(found.inputs, expected[0] if jumps or not more else 2 * [math.nan])
         near(sorted(inputs for inputs, _ in request.answers(values)), sorted(inside))
     assert inside and len(inside) < len(modes)
+    # The end of a sweep is not beyond it, however the outputs are rounded.
+    for second in np.linspace(start[1] - 0.3, start[1] + 0.3, 9):
+        places = mechanisms.create('five_bar').solve([ends[1], second], ['P'])['P'] * scale
+        near(request.command(places.tolist(), None, [ends[1] - 0.01, second]).inputs,
+             [ends[1], second])
 
 
 @pytest.mark.parametrize('name, sweep, value, reason', [

@@ -69,7 +69,7 @@ class Kinematics:
         self.points, self.joints = tuple(built.points), tuple(built.joint_values)
         self.grounded, self.axes = built.grounded, built.axes
         self.bars = tuple((bar.first, bar.second) for bar in built.bars)
-        self.cylinders, self.yokes = tuple(built.cylinders), dict(built.yokes)
+        self.cylinders, self.yokes = tuple(built.cylinders), MappingProxyType(built.yokes)
         self._evaluated: dict = {}
         evaluate_in_order(self.formulas.constants, self.dimensions, self._evaluated)
         self._poses, self.cache = Cache(), Cache()
@@ -99,8 +99,8 @@ class Kinematics:
     def frames(self) -> Mapping:
         """Coordinates of each link's joints [m] in the link's frame, x along its bar."""
         return MappingProxyType({
-            link: {name: tuple(map(self._number, (place.x, place.y)))
-                   for name, place in frame.items()}
+            link: MappingProxyType({name: tuple(map(self._number, (place.x, place.y)))
+                                    for name, place in frame.items()})
             for link, frame in self.formulas.built.frames.items()})
 
     @property

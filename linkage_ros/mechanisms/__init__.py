@@ -26,7 +26,8 @@ from ..linkage import checked_branches, checked_dimensions, Design, Mechanism
 from ..words import plain_text, short_repr, suggestion
 
 # The mechanisms of a scene without names, and their scales: they are 0.5 m to 1.5 m in size.
-CATALOGUE = {'water_drop': 0.1, 'jansen': 0.005, 'peaucellier': 0.1, 'slotted_lever': 0.002}
+CATALOGUE: Mapping[str, float] = MappingProxyType({
+    'water_drop': 0.1, 'jansen': 0.005, 'peaucellier': 0.1, 'slotted_lever': 0.002})
 
 WRITTEN = tuple(custom.WORDS)
 # The modules of this folder by type, those of CATALOGUE first.

@@ -172,10 +172,11 @@ class MechanismTopics:
         is_inside = any(input_.holds(arc, self.inputs[0], self.inputs[0])
                         for arc in inputs[0].reach)
         if len(inputs) > 1 or len(self.model.assembly.legs) > 1 or is_inside:
-            return f'{failure}: no place for "{self._unplaced(first)}"'
+            lines = ', '.join(f'"{line}"' for line in self._unplaced(first))
+            return f'{failure}: no place for {lines}'
         return f'{failure}; the reach is {scene.in_words(inputs[0].reach)} {input_.unit}'
 
-    def _unplaced(self, leg: int) -> str:
+    def _unplaced(self, leg: int) -> list[str]:
         """Return the first joint line of a leg that has no place, and further ones with limits."""
         mechanism, (lag, start, side, _) = self.model.mechanism, [
             *self.model.assembly.legs.values()][leg]
@@ -183,6 +184,7 @@ class MechanismTopics:
                   for name, value in zip(mechanism.inputs, self.inputs)]
         linkage = mechanism.linkage
         quantities = {**linkage.solve(inputs), **linkage.joint_angles(inputs)}
-        lines = [line.text for line in linkage.design.lines if any(
+        lines = [line for line in linkage.design.lines if any(
             np.isnan(quantities.get(name, 0.0)).any() for name in line.names)]
-        return '", "'.join([*lines[:1], *(line for line in lines[1:] if ' within ' in line)])
+        return [line.text for line in lines if line is lines[0] or any(
+            argument.option == 'within' for argument in line.arguments)]

@@ -106,10 +106,10 @@ class SceneParameters:
         descriptor = copy(descriptor)
         # rclpy changes the descriptor's type to that of a refused value.
         descriptor.type = _kind(field).value
-        if field.high is not None:
+        if field.ends:
             # rclpy would refuse values that differ from an end by rounding.
             is_integer = field.kind == 'integer'
-            ends = {'from_value': field.low, 'to_value': field.high}
+            ends = dict(zip(('from_value', 'to_value'), field.ends))
             descriptor.integer_range = [IntegerRange(step=1, **ends)] if is_integer else []
             descriptor.floating_point_range = [] if is_integer else [FloatingPointRange(**ends)]
         return descriptor

@@ -20,13 +20,18 @@ class TextPublisher:
     """A publisher of a latched text whenever it changes."""
 
     def __init__(self, node: Node, name: str):
-        self._publisher, self._text = node.create_publisher(String, name, LATCHED), ''
+        self._node, self._name, self._text = node, name, ''
+        self._publisher = node.create_publisher(String, name, LATCHED)
 
     def publish(self, text: str) -> None:
-        """Publish a text, unless it is empty or unchanged."""
-        if text not in ('', self._text):
-            self._text = text
+        """Publish a text unless it is unchanged; withdraw the last one if it is empty."""
+        if text and text != self._text:
             self._publisher.publish(String(data=text))
+        elif self._text and not text:
+            # Later subscribers must not receive it; an empty one would be a broken robot model.
+            self._node.destroy_publisher(self._publisher)
+            self._publisher = self._node.create_publisher(String, self._name, LATCHED)
+        self._text = text
 
 
 class TrackedPublisher:

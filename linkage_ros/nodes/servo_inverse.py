@@ -129,7 +129,7 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
     seed = [np.array(seeds) if len(seeds) > 1 else seeds[0]] if seeds else None
     if seed and not np.all(np.abs(seed[0]) <= scene.MAX_POSITION):
         raise ValueError(f'servo_near must be finite and within {scene.MAX_POSITION:g} '
-                         f'{inverse.units[0]} of zero')
+                         f'{inverse.inverse.inputs[0].unit} of zero')
     (positions,), (rates,) = inverse.positions([np.array(values) if n > 1 else values[0]], seed)
     response.servo_angle = array('d', np.ravel(positions).tobytes())
     response.reduction = array('d', np.ravel(rates).tobytes())

@@ -227,7 +227,7 @@ def travels(mechanism: SceneMechanism) -> dict[str, Arc]:
     limit, have none. That of another joint is wider by SLACK; one that turns past +-pi has none.
     With several inputs, whose reach depends on each other, no other joint has one.
     """
-    linkage, reach, scale = mechanism.linkage, mechanism.reach, mechanism.scale_of
+    linkage, scale = mechanism.linkage, mechanism.scale_of
     ends: dict[str, Arc] = {}
     has_one_leg = mechanism.leg_pairs == 1 and not mechanism.mirrored
     for name, settings in mechanism.inputs.items():
@@ -238,9 +238,9 @@ def travels(mechanism: SceneMechanism) -> dict[str, Arc]:
             ends[name] = float(low + turns), float(high + turns)
     others = [name for name in linkage.joints if name not in mechanism.inputs]
     if len(mechanism.inputs) == 1 and others:
-        ranges = linkage.cache.get_or_make(('travels', *reach), lambda: np.array([[extremes(
-            lambda theta, name=name: linkage.joint_angles(theta, [name])[name], *arc,
-            linkage.is_angle(name)) for arc in reach] for name in others]))
+        ranges = linkage.cache.get_or_make('travels', lambda: np.array([[extremes(
+            lambda theta, name=name: linkage.joint_angles(theta, [name])[name], low, high,
+            linkage.is_angle(name)) for low, high in linkage.reach()] for name in others]))
         for name, lows, highs in zip(others, *ranges[..., 0].transpose(2, 0, 1)):
             slack = SLACK if linkage.is_angle(name) else SLACK * float(linkage.longest)
             low, high = float(lows.min()) - slack, float(highs.max()) + slack

@@ -41,7 +41,7 @@ GENERAL = {
         rule='1 to 100 characters that can be seen, the first a letter, digit or _'),
     'frame_prefix': replace(FRAME, meaning='Prefix of the frames of markers and loci, as in '
                                            'robot_state_publisher.'),
-    'rate': Field('double', 'Rate of crank messages [Hz]; 0: none.', 0.0, 1000.0, default=50.0,
+    'rate': Field('double', 'Rate of crank messages [Hz]; 0: none.', (0.0, 1000.0), default=50.0,
                   readers=(DRIVER,), unit='Hz')}
 
 
@@ -74,11 +74,8 @@ class Scene:
     def changed_from(self, old: 'Scene') -> list[Parameter]:
         """Return the parameters whose values differ from an older scene of the same mechanisms."""
         # No change adds or removes a parameter.
-        parts = [(self.general, old.general), *(
-            (mechanism.parameters, old.mechanisms[name].parameters)
-            for name, mechanism in self.mechanisms.items())]
-        return [parameter for part, before in parts if part is not before
-                for parameter, other in zip(part, before) if parameter.value != other.value]
+        return [parameter for parameter, before in zip(self.parameters, old.parameters)
+                if parameter.value != before.value]
 
 
 def load(path: str) -> Scene:

@@ -34,7 +34,7 @@ def is_ratio(ratio: float) -> bool:
     return 1e-30 <= abs(ratio) <= 1e30
 
 
-SPEED = Field('double', 'Speed of the {0} [{unit}].', -MAX_SPEED, MAX_SPEED, readers=(DRIVER,),
+SPEED = Field('double', 'Speed of the {0} [{unit}].', (-MAX_SPEED, MAX_SPEED), readers=(DRIVER,),
               unit='{1}/s', group='speeds')
 START = Field('double', 'Initial value of the {0} [{unit}]; a new value moves it there.',
               default=0.0, readers=(DRIVER,), unit='{1}', group='starts')
@@ -68,8 +68,6 @@ class InputSettings:
         Intervals of the input in which the linkage can be assembled.
     speed : float
         Speed of the motion [rad/s or m/s].
-    default_speed : float
-        Its default [rad/s or m/s]: 1 rad/s, or a stroke in three seconds.
     start : float
         Initial value of the motion; outside the sweep, this begins at its nearer end.
     sweep : (float, float), optional
@@ -91,7 +89,6 @@ class InputSettings:
     input: Input
     reach: tuple[Arc, ...]
     speed: float
-    default_speed: float
     start: float
     sweep: Arc | None
     ends: Arc | None
@@ -116,10 +113,15 @@ def in_words(arcs: Iterable[Arc]) -> str:
     return truncated(' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in arcs), MAX_ARCS)
 
 
-def read_settings(name: str, linkage: Mechanism, input_: Input, reach: tuple[Arc, ...],
-                  scale: float, values: Values) -> InputSettings:
+def reach_of(linkage: Mechanism, input_: Input) -> tuple[Arc, ...]:
+    """Return the reach of an input [rad or m]; that of one of several depends on the others."""
+    return ((input_.low, input_.high),) if len(linkage.inputs) > 1 else tuple(linkage.reach())
+
+
+def read_settings(name: str, linkage: Mechanism, input_: Input, scale: float, values: Values
+                  ) -> InputSettings:
     """Read the settings of an input; its lengths are those of the linkage times `scale`."""
-    key, default_speed = input_.name, 1.0
+    key, default_speed, reach = input_.name, 1.0, reach_of(linkage, input_)
     if not input_.is_angle:
         input_ = input_._replace(low=scale * input_.low, high=scale * input_.high)
         reach = tuple((scale * low, scale * high) for low, high in reach)
@@ -130,9 +132,9 @@ def read_settings(name: str, linkage: Mechanism, input_: Input, reach: tuple[Arc
         return values.take(f'{key}.{setting}', field.about(key, input_.unit, **about), default)
 
     is_whole = input_.is_whole(reach)
-    farthest = max(MAX_START, input_.high) if input_.is_angle else None
+    farthest = max(MAX_START, input_.high)
     speed = take('speed', SPEED, default_speed)
-    start = take('start', START, low=farthest and -farthest, high=farthest)
+    start = take('start', START, ends=(-farthest, farthest) if input_.is_angle else None)
     sweep = ends = take('sweep', SWEEP) or None
     source, measures = take('source', SOURCE), take('measures', MEASURES)
     if ends and not is_whole and not any(input_.holds(arc, *ends) for arc in reach):
@@ -149,6 +151,6 @@ def read_settings(name: str, linkage: Mechanism, input_: Input, reach: tuple[Arc
     if not ends and not is_whole:
         low, high = next((arc for arc in reach if input_.holds(arc, start, start)), reach[0])
         sweep = low + SWEEP_MARGIN * (high - low), high - SWEEP_MARGIN * (high - low)
-    return InputSettings(input_, reach, speed, default_speed, start, sweep, ends,
+    return InputSettings(input_, reach, speed, start, sweep, ends,
                          source or f'{name}_{measures or key}', take('ratio', RATIO),
                          take('offset', OFFSET), measures)

@@ -11,7 +11,7 @@ from typing import Any, Iterable, Mapping, NamedTuple, Sequence
 
 import numpy as np
 
-from .input_settings import in_words, InputSettings
+from .input_settings import in_words
 from .scene_mechanism import divided, SceneMechanism
 from ..linkage import Solution
 from ..words import join_names
@@ -80,7 +80,6 @@ class InverseRequest:
         self._mechanism, self._settings = mechanism, list(mechanism.inputs.values())
         self.outputs = [output or LEVER for output in outputs]
         self.inverse = mechanism.linkage.inverse(tuple(self.outputs))
-        self.units = [settings.input.unit for settings in self._settings]
         self._units, self._scales = [*map(mechanism.scale_of, self.outputs)], mechanism.scales
         self._actuators = [settings.actuator for settings in self._settings]
         # Factors of the linkage's rates: of each output by the first actuator, by the second, ...
@@ -165,17 +164,9 @@ class InverseRequest:
         They are sorted by their distance from the inputs `seed` [rad or m], by default the start.
         """
         seed = [settings.start for settings in self._settings] if seed is None else seed
-        answers = self._inside(self.inverse.all(
-            divided(values, self._units), divided(seed, self._scales)))
-        sizes = [settings.input.size for settings in self._settings]
-        return sorted(answers, key=lambda answer: math.dist(
-            np.divide(answer[0], sizes), np.divide(seed, sizes)))
-
-    def _inside(self, solutions: Sequence[Solution]) -> list[tuple[list[float], Solution]]:
-        """Return those of the linkage's solutions that lie inside the sweeps, with its inputs."""
-        answers = [([_between_ends(settings, value * scale) for settings, value, scale in zip(
-            self._settings, solution.inputs, self._scales)], solution) for solution in solutions]
-        return [answer for answer in answers if not any(map(math.isnan, answer[0]))]
+        return [([*map(operator.mul, solution.inputs, self._scales)], solution)
+                for solution in self.inverse.all(divided(values, self._units), divided(
+                    seed, self._scales), self._mechanism.ends)]
 
     def reason(self, *values: float) -> str:
         """Return in words why values are unreachable."""
@@ -183,16 +174,16 @@ class InverseRequest:
             return 'a value must be finite'
         middles = [0.5 * sum(settings.ends or (2.0 * settings.start,))
                    for settings in self._settings]
-        answers = self.inverse.all(
-            divided(values, self._units), divided(middles, self._scales))
         what = f'{join_names(self.outputs)} at ' * (len(values) > 1) + join_names(
             f'{value:.6g}' for value in values)
-        if self._inside(answers):
+        if self.answers(values, middles):
             return f'the way to {what} leads through a singular pose, out of the reach or a sweep'
         limited = [settings for settings in self._settings if settings.ends]
         sweeps = ', '.join(f'{settings.input.name}.sweep {in_words(settings.arcs)}'
                            for settings in limited)
-        if answers and limited:
+        answers = limited and self.inverse.all(
+            divided(values, self._units), divided(middles, self._scales))
+        if answers:
             needed = ', '.join(
                 f'{settings.input.name} at {value * scale:.6g} {settings.input.unit}'
                 for settings, value, scale in zip(self._settings, answers[0].inputs, self._scales))
@@ -205,11 +196,3 @@ class InverseRequest:
         reached = in_words((low, high) for (low, _), (high, _) in self._mechanism.extremes(output))
         unit = 'rad' if self._mechanism.linkage.is_angle(output) else 'm'
         return f'{output} reaches {reached} {unit}' + f' in {sweeps}' * bool(limited)
-
-
-def _between_ends(settings: InputSettings, value: float) -> float:
-    """Return an input between its ends, a crank after whole periods if needed; else NaN."""
-    low, high = settings.ends or (value, value)
-    if not low <= value <= high:
-        value = float(settings.input.nearest_equivalent(value, 0.5 * (low + high)))
-    return value if low <= value <= high else math.nan

@@ -63,7 +63,7 @@ def read_joint_names(mechanism: str, linkage: Mechanism, leg_pairs: int, mirrore
     unpublished. An angle wraps if it has an offset, unless it is an input. Raises SceneError if a
     line is malformed, or its joint is unknown or has another line.
     """
-    assembly = LegGroup(linkage, leg_pairs, mirrored, reach=())
+    assembly = LegGroup(linkage, leg_pairs, mirrored)
     is_angle = {input_.name: False for input_ in linkage.inputs}
     is_angle |= {leg + joint: linkage.is_angle(joint)
                  for leg in assembly.legs for joint in assembly.joints}

@@ -86,24 +86,25 @@ class LegGroup:
     The legs of one mechanism.
 
     Left legs of pairs are evenly spread over a turn of the crank; each has a right leg if
-    `mirrored`. Several legs need a single crank. `scale` is a factor of every length,
-    `reach` the result of `linkage.reach()`, if known. The keys of `legs` are the prefixes of
-    their joints' names; `joints` are the moving links except the inputs.
+    `mirrored`. Several legs need a single crank. `scale` is a factor of every length. The keys
+    of `legs` are the prefixes of their joints' names; `joints` are the moving links except the
+    inputs.
     """
 
     def __init__(self, linkage: Mechanism, leg_pairs: int = 1, mirrored: bool = False,
-                 scale: float = 1.0, reach: Sequence | None = None):
+                 scale: float = 1.0):
         sides = [('left', 0.0, 1.0), ('right', math.pi, -1.0)][:1 + mirrored]
         self.legs = {f'{side}{j}_': Leg(math.tau * j / leg_pairs, start, sign, scale)
                      for j in range(leg_pairs) for side, start, sign in sides}
         if len(self.legs) == 1:
             self.legs = {'': Leg(0.0, 0.0, 1.0, scale)}
         self.linkage = linkage
-        inputs = {input_.name for input_ in linkage.inputs}
-        self.joints = tuple(name for name in linkage.joints if name not in inputs)
-        self.reach = linkage.reach() if reach is None else reach
+        first, *others = linkage.inputs
+        names = {input_.name for input_ in linkage.inputs}
+        self.joints = tuple(name for name in linkage.joints if name not in names)
         # The reach of one of several inputs depends on the others.
-        self.is_limited = len(inputs) == 1 and not linkage.inputs[0].is_whole(self.reach)
+        self.reach = [] if others else linkage.reach()
+        self.is_limited = not others and not first.is_whole(self.reach)
         self._scale = scale
 
     def solution(self, points: Sequence[str | LinkPoint] = (), joints: Sequence[str] = (),
@@ -132,7 +133,7 @@ class LegGroup:
 
         With several inputs it is empty.
         """
-        if len(self.linkage.inputs) > 1:
+        if not self.reach:
             return np.empty((0, 2))
         low, high = max(self.reach, key=lambda arc: arc[1] - arc[0])
         places = self.linkage.solve(sampled(low, high, LOCUS_SAMPLES), (name,))[name]

@@ -66,7 +66,7 @@ class Field:
         One of KINDS.
     meaning : str
         Description, with the unit in brackets, as {unit}.
-    low, high : float, optional
+    ends : (float, float), optional
         Ends of the allowed range; None: no range.
     default : object
         Value if none is given, unless that depends on other parameters.
@@ -94,8 +94,7 @@ class Field:
 
     kind: str
     meaning: str
-    low: float | None = None
-    high: float | None = None
+    ends: tuple[float, float] | None = None
     default: Any = None
     positive: bool = False
     rule: str = ''
@@ -124,8 +123,10 @@ class Field:
         words = [KINDS[self.kind][1]]
         if self.positive:
             words.append('above 0')
-        if self.high is not None:
-            words.append(f'from {self.low:g} to {self.high:g}')
+        if self.ends:
+            words.append('from {:g} to {:g}'.format(*self.ends))
+        if self.unit:
+            words.append(f'[{self.unit}]')
         return ' '.join(words) + (self.rule and f', {self.rule}')
 
     def checked(self, name: str, value: Any) -> Any:
@@ -160,10 +161,9 @@ class Field:
                 not self.choices or value in self.choices)
         if isinstance(value, float) and not math.isfinite(value) or self.positive and value <= 0:
             return False
-        if self.low is None or self.high is None:
-            return True
-        return self.low <= value <= self.high or isinstance(value, float) and any(
-            math.isclose(value, end, rel_tol=RANGE_TOLERANCE) for end in (self.low, self.high))
+        low, high = self.ends or (value, value)
+        return low <= value <= high or isinstance(value, float) and any(
+            math.isclose(value, end, rel_tol=RANGE_TOLERANCE) for end in (low, high))
 
 
 @cached(2048)

@@ -12,7 +12,7 @@ import math
 import re
 from typing import Any, Mapping, Sequence
 
-from .input_settings import InputSettings, read_settings
+from .input_settings import InputSettings, reach_of, read_settings
 from .joint_names import JointName, read_joint_names
 from .legs import LegGroup
 from .loads import Load, read_loads
@@ -42,12 +42,12 @@ TRACER = Field('string', 'Joint whose curve is the locus; empty: the last.', def
                read_only=True)
 DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [{unit}].', unit='m',
                   group='dimensions')
-BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the default.', -1, 1,
+BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the default.', (-1, 1),
                group='branches')
 SCALE = Field('double', 'Factor of every length.', default=1.0, positive=True)
 # The inverse uses no legs and no `only_named`, but loads and names are valid or not by them.
-LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.', 1, 50,
-                  default=1, readers=(KINEMATICS, INVERSE))
+LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.',
+                  (1, 50), default=1, readers=(KINEMATICS, INVERSE))
 MIRRORED = Field('bool', 'Whether each leg has a mirror image on the other side; '
                  'default: with more than one pair.', readers=(KINEMATICS, INVERSE))
 POINTS = Field('string_array', 'Joints that markers display.', readers=(KINEMATICS,),
@@ -77,16 +77,14 @@ class SceneMechanism:
     """
     A mechanism of a scene, which has one or more equal legs.
 
-    `linkage` is that of a leg, and `reach` the reach of its first input, both before `scale`, a
-    factor of all lengths. `points` are the joints that markers display; `pose` is x, y, z [m],
-    roll, pitch, yaw [rad] in `frame_id`, or in the scene's frame if that is empty. `inputs` are by
-    their names; `joints` are the published names by joint; `loads` are forces by joint, moments by
-    link.
+    `linkage` is that of a leg before `scale`, a factor of all lengths. `points` are the joints
+    that markers display; `pose` is x, y, z [m], roll, pitch, yaw [rad] in `frame_id`, or in the
+    scene's frame if that is empty. `inputs` are by their names; `joints` are the published names
+    by joint; `loads` are forces by joint, moments by link.
     """
 
     name: str
     linkage: Mechanism
-    reach: tuple[Arc, ...]
     scale: float
     leg_pairs: int
     mirrored: bool
@@ -154,11 +152,9 @@ class SceneMechanism:
         inverse = self.linkage.inverse(tuple(outputs))
         targets, seeds = divided(values, units), divided(seed, scales)
         inputs: Sequence[float]
-        inputs, rates = inverse.follow(targets, seeds)
-        if not all(end[0] <= value <= end[1] if end else value == value
-                   for end, value in zip(self.ends, inputs)):
-            inputs, rates = inverse.nearest(targets, seeds, self.ends) if jumps else (
-                [math.nan] * len(seeds), rates)
+        inputs, rates = inverse.follow(targets, seeds, self.ends)
+        if jumps and not math.isfinite(inputs[0]):
+            inputs, rates = inverse.nearest(targets, seeds, self.ends)
         return ([input_ * scale for input_, scale in zip(inputs, scales)],
                 [rate * unit / scale for rate, (scale, unit) in zip(
                     rates, product(scales, units))])
@@ -217,7 +213,7 @@ class SceneMechanism:
 
     def assembly(self) -> LegGroup:
         """Return the solver of all legs."""
-        return LegGroup(self.linkage, self.leg_pairs, self.mirrored, self.scale, self.reach)
+        return LegGroup(self.linkage, self.leg_pairs, self.mirrored, self.scale)
 
     @property
     def tracer(self) -> str:
@@ -235,27 +231,26 @@ def read_mechanism(name: str, entries: Mapping[str, Any],
     """Read a mechanism from its values by full parameter name, other values as `before`."""
     values = Values(entries, f'{name}.', before.parameters if before else ())
     take = values.take
-    linkage, reaches = _linkage(name, take('type', TYPE, name), values)
+    linkage = _linkage(name, take('type', TYPE, name), values)
     scale, (leg_pairs, mirrored) = take('scale', SCALE), _legs(name, linkage, values)
     points = take('points', POINTS.about(
         rule=f'some of {join_names(linkage.points)}, each once', choices=linkage.points),
         linkage.points)
     pose = take('pose', POSE)
-    inputs = {input_.name: read_settings(name, linkage, input_, reach, scale, values)
-              for input_, reach in zip(linkage.inputs, reaches)}
+    inputs = {input_.name: read_settings(name, linkage, input_, scale, values)
+              for input_ in linkage.inputs}
     frame_id, only_named = take('frame_id', FRAME), take('only_named', ONLY_NAMED)
-    joints = read_joint_names(
-        name, linkage, leg_pairs, mirrored, take('joint_names', JOINT_NAMES), only_named)
+    joints = dict(read_joint_names(
+        name, linkage, leg_pairs, mirrored, take('joint_names', JOINT_NAMES), only_named))
     loads = read_loads(name, linkage, take('loads', LOADS))
     if loads and (leg_pairs > 1 or mirrored):
         raise SceneError(f'{name}.loads must be empty for more than one leg')
     values.refuse_unknown()
-    return SceneMechanism(name, linkage, reaches[0], scale, leg_pairs, mirrored, points, pose,
-                          inputs, frame_id, joints, only_named, loads, tuple(values.parameters))
+    return SceneMechanism(name, linkage, scale, leg_pairs, mirrored, points, pose, inputs,
+                          frame_id, joints, only_named, loads, tuple(values.parameters))
 
 
-def _linkage(name: str, type_: str, values: Values) -> tuple[Mechanism, list]:
-    """Read a linkage; return it and the reach of each input."""
+def _linkage(name: str, type_: str, values: Values) -> Mechanism:
     try:
         design = mechanisms.design(type_) if type_ in mechanisms.TYPES else mechanisms.design(
             type_, values.take('joints', JOINTS), values.take('tracer', TRACER) or None,
@@ -269,16 +264,13 @@ def _linkage(name: str, type_: str, values: Values) -> tuple[Mechanism, list]:
                 for key, sign in design.branches.items()}
     try:
         linkage = _built(design, tuple(dimensions.items()), tuple(branches.items()))
-        # The reach of one of several inputs depends on the others.
-        reaches = [((input_.low, input_.high),) for input_ in linkage.inputs]
-        if len(reaches) == 1:
-            reaches = [tuple(linkage.reach())]
+        reaches = [reach_of(linkage, input_) for input_ in linkage.inputs]
     except ValueError as error:
         raise SceneError(f'{name}.dimensions: {error}') from None
-    if not reaches[0]:
+    if not all(reaches):
         raise SceneError(f'{name}.{"dimensions" if dimensions else "joints"} must let the {type_} '
                          f'be assembled at some {linkage.inputs[0].kind}')
-    return linkage, reaches
+    return linkage
 
 
 @cached(16, shared=True)

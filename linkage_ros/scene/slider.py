@@ -30,8 +30,8 @@ ANGLES, FEW_ANGLES = 91, 13
 def ends(mechanism: SceneMechanism, parameter: Parameter) -> Arc | None:
     """Return the ends of the slider of a mechanism's parameter; None if it has no slider."""
     field, value = parameter.field, parameter.value
-    if field.low is not None and field.high is not None:
-        return field.low, field.high
+    if field.ends:
+        return field.ends
     if field.kind != 'double':
         return None
     _, what, key = [*parameter.name.split('.'), ''][:3]

@@ -54,14 +54,14 @@ def drawn(mechanism: SceneMechanism, speeds: Mapping[str, float]) -> dict[str, A
     """
     Describe what the page needs to know of a mechanism beside its parameters and markers.
 
-    `points` are the joints of a leg in markers, `legs` the number of legs, `pairs` of those on one
-    side. Each input has its unit, `ends` of its slider [rad or m], `turn` [rad] after which its
-    poses repeat (None: never), and speed when it plays. `sides` are the words for a branch of +1
-    and of -1.
+    `points` are the joints of a leg in markers; `legs` has for each leg the number of its pair,
+    from the front. Each input has its unit, `ends` of its slider [rad or m], `turn` [rad] after
+    which its poses repeat (None: never), and speed when it plays. `sides` are the words for a
+    branch of +1 and of -1.
     """
     return {
-        'space': mechanism.in_space, 'points': mechanism.points, 'pairs': mechanism.leg_pairs,
-        'legs': mechanism.leg_pairs * (1 + mechanism.mirrored),
+        'space': mechanism.in_space, 'points': mechanism.points,
+        'legs': sorted((1 + mechanism.mirrored) * [*range(mechanism.leg_pairs)]),
         'sides': {name: mechanism.linkage.line_of(name).sides or ('+1', '−1')
                   for name in mechanism.linkage.branches},
         'inputs': {name: {

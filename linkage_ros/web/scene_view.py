@@ -42,8 +42,13 @@ POLL_S, LINGER_S = 1.0, 1.0
 # For the first announcement of a node, and a response; between two looks for one of these.
 MAX_ANNOUNCE_S, MAX_ANSWER_S, RETRY_S = 1.0, 3.0, 0.005
 
-# Downloads, the last two of linkages in a plane only; the page itself draws 'png'.
-FORMS = 'yaml', 'png', 'h', 'csv', 'urdf'
+# Downloads: ending, name and description. The last two are of linkages in a plane only; the page
+# itself draws the picture.
+FORMS = (
+    ('yaml', 'scene file', 'The scene as it is now'), ('png', 'PNG', 'The present view'),
+    ('h', 'C', 'A C99 header for a microcontroller'),
+    ('csv', 'CSV', 'All outputs over a turn or a stroke, in radians and metres, the input at '
+     '1 rad/s or 1 m/s'), ('urdf', 'URDF', 'The robot model'))
 
 JsonObject = dict[str, Any]
 
@@ -276,9 +281,10 @@ class SceneView:
 
     def _playing(self, shown: ShownMechanism) -> dict[str, float]:
         """Return the speeds of a mechanism when it plays: the last ones that were not zero."""
-        return {name: self._speeds[shown.owner].get(
-            f'{shown.name}.{name}.speed', settings.default_speed)
-            for name, settings in self._mechanism(shown).inputs.items()}
+        speeds = self._speeds[shown.owner]
+        return {parameter.name.split('.')[1]: speeds.get(parameter.name, parameter.default)
+                for parameter in self._mechanism(shown).parameters
+                if parameter.field.group == 'speeds'}
 
     async def _watch(self) -> None:
         """Observe the graph until the last page is closed."""

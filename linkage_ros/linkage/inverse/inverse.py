@@ -175,7 +175,8 @@ class Inverse:
 
     # --- all solutions ---
 
-    def all(self, values: ArrayLike, near: ArrayLike | None = None) -> list[Solution]:
+    def all(self, values: ArrayLike, near: ArrayLike | None = None, ends: Ends = None
+            ) -> list[Solution]:
         """
         Return all solutions for one value of each output.
 
@@ -187,6 +188,8 @@ class Inverse:
         near : array-like (inputs,), optional
             Values of the inputs [rad or m]. Whole turns are added to the solutions to bring them
             nearest to it, and the nearest comes first; the unit of a length is about its stroke.
+        ends : sequence of (float, float) or None, optional
+            For each input the range [rad or m] that the solutions have to lie in, or None.
 
         Returns
         -------
@@ -198,16 +201,18 @@ class Inverse:
         Raises
         ------
         ValueError
-            If there is not one value for each output, and one finite `near` for each input.
+            If there is not one value for each output, and one finite `near` for each input, or
+            ends are not finite and in order.
 
         """
         seed = () if near is None else self._numbers(near, 'near', finite=True)
-        solutions = [row[:self._n] for row in self._all(self._numbers(values), seed)]
+        limits, sizes = checked_ends(self._n, ends), self.problem.sizes
+        placed = [self._choice.of([row], seed, limits)
+                  for row in self._all(self._numbers(values), seed)]
+        solutions = [tuple(row[:self._n]) for row in placed if row[0] == row[0]]
         if seed:
-            solutions = sorted(
-                (self.problem.nearest_equivalent(inputs, seed) for inputs in solutions),
-                key=lambda inputs: math.dist(np.divide(inputs, self.problem.sizes),
-                                             np.divide(seed, self.problem.sizes)))
+            solutions.sort(key=lambda inputs: math.dist(
+                np.divide(inputs, sizes), np.divide(seed, sizes)))
         return [Solution(inputs, self) for inputs in solutions]
 
     def over(self, *values: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
@@ -376,7 +381,7 @@ class Inverse:
         chosen = self._choice.along(solutions, seed, limits)
         return tuple(chosen[:self._n]), tuple(chosen[self._n:])
 
-    def follow(self, values: ArrayLike, near: ArrayLike) -> tuple[Row, Row]:
+    def follow(self, values: ArrayLike, near: ArrayLike, ends: Ends = None) -> tuple[Row, Row]:
         """
         Return the solution that is continuous from given inputs.
 
@@ -386,19 +391,27 @@ class Inverse:
             The values of the outputs [rad or m].
         near : array-like (inputs,)
             The present inputs [rad or m]; whole turns of a crank are preserved.
+        ends : sequence of (float, float) or None, optional
+            For each input the range [rad or m] that the solution has to lie in, or None.
 
         Returns
         -------
         (tuple of float, tuple of float)
             The inputs [rad or m] at the end of a motion in which the outputs go straight from
             their present values to `values`, angles the shorter way; and the rate of each output
-            by the first input, by the second and so on. NaN if the motion passes a dead point or
-            leaves the reach.
+            by the first input, by the second and so on. NaN if the motion passes a dead point,
+            leaves the reach or goes beyond an end.
 
         """
-        rows = self._all(self._numbers(values), self._numbers(near, 'near'), Inverse._continued)
-        row, = rows or [(math.nan,) * (self._n + self._n ** 2)]
-        return row[:self._n], row[self._n:]
+        none, limits = (math.nan,) * (self._n + self._n ** 2), checked_ends(self._n, ends)
+        row, = self._all(
+            self._numbers(values), self._numbers(near, 'near'), Inverse._continued) or [none]
+        if any(limits):
+            inputs, row = row[:self._n], self._choice.of([row], row[:self._n], limits)
+            # A motion does not jump by a whole turn.
+            if any(abs(x - y) > input_.size for x, y, input_ in zip(row, inputs, self.inputs)):
+                row = none
+        return tuple(row[:self._n]), tuple(row[self._n:])
 
     # --- arrays of other packages ---
 

@@ -5,8 +5,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any, Mapping
 
 from . import joint_lines, rod_lines
@@ -34,17 +35,25 @@ class Design:
     inputs: tuple[str, ...] = ()
     turned: tuple[tuple[str, float], ...] = ()
 
+    # All its mechanisms share a design, so nobody can change it.
+    def __post_init__(self) -> None:
+        object.__setattr__(self, 'dimensions', MappingProxyType(dict(self.dimensions)))
+
+    def __reduce__(self) -> tuple:
+        name, dimensions, *others = (getattr(self, part.name) for part in fields(self))
+        return Design, (name, dict(dimensions), *others)
+
     @property
     def words(self) -> Any:
         """Return the module that reads and draws the lines."""
         return rod_lines if self.in_space else joint_lines
 
     @cached_property
-    def lines(self) -> list[joint_lines.Line]:
+    def lines(self) -> tuple[joint_lines.Line, ...]:
         """Return the joints as constructions."""
-        return self.words.parse(self.joints)
+        return tuple(self.words.parse(self.joints))
 
     @cached_property
-    def branches(self) -> dict:
+    def branches(self) -> Mapping[str, int]:
         """Return the assembly sign, +1 or -1, of each joint that has two."""
-        return self.words.branches(self.lines)
+        return MappingProxyType(self.words.branches(self.lines))

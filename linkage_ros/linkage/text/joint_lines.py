@@ -20,6 +20,7 @@ as at a change point; else it is NaN.
 
 from __future__ import annotations
 
+from math import prod
 import re
 from typing import Any, Iterable, Mapping, NamedTuple, Sequence
 
@@ -92,8 +93,9 @@ class Line(NamedTuple):
     word: str
     args: tuple[str, ...]
     arguments: tuple[Argument, ...] = ()
-    # The ground joints of each mirror line in which it is an image, in order.
+    # The ground joints of each mirror line in which it is an image, in order; and of what.
     mirrors: tuple[tuple[str, ...], ...] = ()
+    original: Line | None = None
 
     @property
     def depends_on(self) -> tuple[str, ...]:
@@ -187,7 +189,8 @@ def _mirrored(lines: list[Line], mirror: Line) -> list[Line]:
             args += [f'geared {line.input_name or line.word + str(number)} {ratio} 0']
         names = [name + mirror.names[0] for name in line.names[::-1]]
         images.append(parsed(f'{" ".join(names)} {line.word} {" ".join(args)}')._replace(
-            text=mirror.text, mirrors=(*line.mirrors, mirror.depends_on)))
+            text=mirror.text, mirrors=(*line.mirrors, mirror.depends_on),
+            original=line.original or line))
     return images
 
 
@@ -316,9 +319,9 @@ def check_numbers(design: Any, dimensions: Mapping) -> None:
 
 
 def branches(lines: Iterable[Line]) -> dict:
-    """Return the assembly sign, +1 or -1, of each joint that can be assembled in two ways."""
+    """Return the assembly sign, +1 or -1, of each joint with two; an image has its original's."""
     return {line.names[0]: int(_WORDS[arg])
-            for line in lines if line.word != 'rigid'
+            for line in lines if line.word != 'rigid' and not line.original
             for kind, arg, _ in line.arguments if '|' in kind}
 
 
@@ -369,5 +372,8 @@ def _value(line: Line, arg: Argument, symbols: Mapping[str, Real],
     if arg.kind in _NUMBERS:
         return formula(arg.text).expression(symbols)
     if '|' in arg.kind:
-        return signs.get(line.names[0], _WORDS[arg.text])
+        # An image is on the other side where its original is.
+        drawn = branches([line.original or line])
+        return _WORDS[arg.text] * prod(signs.get(name, sign) * sign
+                                       for name, sign in drawn.items())
     return True if arg.kind == arg.text else arg.text

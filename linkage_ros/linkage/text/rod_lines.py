@@ -168,7 +168,7 @@ def draw(builder: Builder, lines: Iterable[Line], symbols: Mapping[str, Real],
     _Drawing(builder, list(lines), symbols, signs, inputs).draw()
 
 
-def turning_rods(lines: list[Line], inputs: Collection[str]) -> list[str]:
+def turning_rods(lines: Sequence[Line], inputs: Collection[str]) -> list[str]:
     """
     Return the rods that place one joint each, on either of two sides, for these inputs.
 
@@ -187,7 +187,7 @@ Group = tuple[tuple[Line, ...], tuple[str, ...]]
 class _LinkTree:
     """The tree of links, and the order in which rods place the joints that are not inputs."""
 
-    def __init__(self, lines: list[Line], inputs: Collection[str] = ()):
+    def __init__(self, lines: Sequence[Line], inputs: Collection[str] = ()):
         self.lines = {line.names[0]: line for line in lines}
         self.inputs = tuple(inputs) or tuple(
             name for name, line in self.lines.items() if line.word in INPUTS)

@@ -34,10 +34,14 @@ export function figures(value, maxDigits) {
 /** A value in its displayed unit, or a dash for none. */
 export const shown = (value, unit, digits) => value === null || value === undefined ? '—' : figures(value * units.of(unit).factor, digits);
 
-/** The value [rad or m] of a text in a displayed unit, `factor` times smaller; or the reason why it has none. */
-export async function read(text, unit, factor) {
+/** Leave a field; pass on the value [rad or m] of its text in a displayed unit, `factor` times smaller, or say why it has none. */
+export async function read(field, unit, factor, pass, say) {
+  const text = field.value.trim();
+  field.blur();
+  if (!text) return;
   const { value, turns, reason } = await ask({ op: 'read', text });
-  return reason ? { reason } : { value: turns && unit?.startsWith('rad') ? value : value / factor };
+  if (reason) say(refusal(reason));
+  else pass(turns && unit?.startsWith('rad') ? value : value / factor);
 }
 
 const STOPS = 1000;
@@ -118,10 +122,7 @@ export class Slider {
     this.number.onfocus = () => { this.gesture ??= {}; };
     this.number.onblur = () => this.release();
     this.number.oninput = () => this.explain();
-    this.number.onchange = () => {
-      this.type(this.number.value.trim());
-      this.number.blur();
-    };
+    this.number.onchange = () => read(this.number, this.unit, this.factor, typed => this.offer(typed), words => this.explain(words));
     this.bound(low, high);
   }
 
@@ -133,13 +134,6 @@ export class Slider {
   /** The factor from the value to the displayed number. */
   get factor() {
     return units.of(this.unit).factor * this.times();
-  }
-
-  async type(text) {
-    if (!text) return;
-    const { value, reason } = await read(text, this.unit, this.factor);
-    if (reason) this.explain(refusal(reason));
-    else this.offer(value);
   }
 
   /** The value at the slider's place: even, or fine about zero. */
@@ -155,15 +149,8 @@ export class Slider {
     if (!refused) this.accepted = value;
     const [wanted, low, high] = [requested, this.low, this.high].map(number => this.shortened(number));
     const unit = this.unitShown.textContent;
-    this.explain(refused ? `Refused: ${wanted} ${unit}; the slider goes from ${low} to ${high} ${unit}. ${this.translated(reason)}` : reason, refused);
+    this.explain(refused ? `Refused: ${wanted} ${unit}; the slider goes from ${low} to ${high} ${unit}. ${reason}` : reason, refused);
     if (!this.gesture && !this.requests.waiting) this.render();
-  }
-
-  /** A node's rule with its numbers and its unit as they are displayed. */
-  translated(reason) {
-    return reason.replace(/ must .*/s, rule => rule
-      .replace(/(?<![\w.])-?\d+(\.\d+)?(e[-+]?\d+)?(?!\w)/g, number => this.shortened(Number(number)))
-      .replace(`] ${this.unit},`, `] ${this.unitShown.textContent},`));
   }
 
   explain(words, refused) {
@@ -199,7 +186,6 @@ export class Slider {
 
   render() {
     put(this.unitShown, { textContent: units.of(this.unit).name });
-    if (this.accepted === null) return;
     const part = clamp((this.accepted - this.middle) / this.half, -1, 1);
     this.range.value = this.isWhole ? this.accepted : STOPS * (Math.sign(part) * Math.abs(part) ** (1 / this.power) + 1) / 2;
     const text = this.shortened(this.accepted);

@@ -138,7 +138,7 @@ function show(key) {
   const selected = [...mechanisms.values()].filter(mechanism => !key || mechanism.key === key);
   picture.show(selected);
   panel.show(selected, several && !key);
-  names.parentElement.hidden = selected.length !== 1 || selected[0].legs > 1;
+  names.parentElement.hidden = selected.length !== 1 || selected[0].legs.length > 1;
   arrows.parentElement.hidden = selected.every(({ space }) => space);
   draw();
 }

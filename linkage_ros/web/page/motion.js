@@ -4,7 +4,7 @@
 // The motion of a mechanism: a slider for each input, play and step, and its present outputs.
 
 import { isOpen } from './connection.js';
-import { button, element, Newest, put, read, Reason, refusal, shown, Slider, units } from './control.js';
+import { button, element, Newest, put, read, Reason, shown, Slider, units } from './control.js';
 
 const STEP = Math.PI / 180;
 const STEPS_A_STROKE = 100;
@@ -65,24 +65,14 @@ class OutputRow {
     this.rates = Array.from({ length: count }, () => element('td'));
     this.row = element('tr', {}, element('th', { scope: 'row' }, element('span', { textContent: name })),
       element('td', {}, this.value, ' ', this.unit), ...this.rates);
-    this.value.onchange = async () => {
+    this.value.onchange = () => {
       const { unit } = this.output;
-      const text = this.value.value.trim();
-      const { value, reason } = text ? await read(text, unit, units.of(unit).factor) : {};
-      this.value.blur();
-      if (value !== undefined) want({ output: name, value });
-      else say(refusal(reason));
+      read(this.value, unit, units.of(unit).factor, value => want({ output: name, value }), say);
     };
     this.value.onblur = () => this.render();
   }
 
-  show(output, inputs) {
-    Object.assign(this, { output, inputs });
-    this.render();
-  }
-
   render() {
-    if (!this.output) return;
     const { value, unit, rates } = this.output;
     if (document.activeElement !== this.value) put(this.value, { [this.editable ? 'value' : 'textContent']: shown(value, unit, FIGURES) });
     put(this.unit, { textContent: units.of(unit).name });
@@ -102,7 +92,7 @@ export class Motion {
     this.play = button('', () => this.stopOrPlay(), { hidden: !mechanism.group('speeds').length });
     this.place = element('div', { className: 'inputs' });
     this.table = element('table');
-    this.folding = element('details', { open, hidden: true }, element('summary', { textContent: 'Outputs', title: 'Coordinates count from the origin of its own plane' }), this.table);
+    this.folding = element('details', { open, hidden: true, ontoggle: () => this.renderOutputs() }, element('summary', { textContent: 'Outputs', title: 'Coordinates count from the origin of its own plane' }), this.table);
     this.element = element('div', {}, this.place, this.reason.line, this.folding);
     this.target = new Newest(async want => {
       const answer = await this.want(want);
@@ -149,8 +139,8 @@ export class Motion {
     if (names !== this.built) this.build(names, inputs, outputs);
     for (const [name, value] of Object.entries(inputs)) this.inputs.get(name).show(this.mechanism.inputs[name], value);
     this.onshow();
-    if (!this.folding.open) return;
-    for (const [name, output] of Object.entries(outputs)) this.outputs.get(name).show(output, Object.values(this.mechanism.inputs));
+    for (const [name, output] of Object.entries(outputs)) Object.assign(this.outputs.get(name), { output, inputs: Object.values(this.mechanism.inputs) });
+    this.renderOutputs();
   }
 
   build(names, inputs, outputs) {
@@ -174,6 +164,10 @@ export class Motion {
 
   render() {
     for (const slider of this.inputs.values()) slider.render();
-    for (const row of this.outputs.values()) row.render();
+    this.renderOutputs();
+  }
+
+  renderOutputs() {
+    if (this.folding.open) for (const row of this.outputs.values()) row.render();
   }
 }

@@ -275,14 +275,10 @@ export class Picture {
   }
 
   /** Call back with each leg's part of a shape, the last pair first, and its closeness to the front. */
-  legs({ mechanism, piece, places }, draw) {
-    const { pairs, legs } = mechanism;
-    const size = places.length / legs;
+  legs({ mechanism: { legs }, piece, places }, draw) {
+    const [size, last] = [places.length / legs.length, legs.at(-1)];
     if (size % (2 * piece)) return draw(places, 0);
-    for (let leg = legs - 1; leg >= 0; leg--) {
-      const pair = Math.floor(leg * pairs / legs);
-      draw(places.subarray(leg * size, (leg + 1) * size), pairs > 1 ? 1 - pair / (pairs - 1) : 0);
-    }
+    for (let leg = legs.length - 1; leg >= 0; leg--) draw(places.subarray(leg * size, (leg + 1) * size), last && 1 - legs[leg] / last);
   }
 
   lines(shape) {
@@ -421,7 +417,7 @@ export class Picture {
   /** Return the joints of each leg by name, in pixels of the view. */
   legsSeen(shapes = this.shapes()) {
     return shapes.filter(({ kind }) => kind === 'joints').flatMap(({ mechanism, places, map }) => {
-      const { points, legs } = mechanism;
+      const { points, legs: { length: legs } } = mechanism;
       if (!this.scale || places.length !== 2 * points.length * legs) return [];
       return Array.from({ length: legs }, (_, leg) => ({
         mechanism, leg, map, seen: new Map(points.map((name, i) => {

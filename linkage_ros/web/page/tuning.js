@@ -7,13 +7,6 @@ import { button, Choice, element, Reason, refusal, Slider } from './control.js';
 
 const RESTED = 300;
 const SWITCH = [[true, 'yes'], [false, 'no']];
-const FORMS = {
-  'scene file': ['yaml', 'The scene as it is now'],
-  CSV: ['csv', 'All outputs over a turn or a stroke, in radians and metres, the input at 1 rad/s or 1 m/s'],
-  PNG: ['png', 'The present view'],
-  URDF: ['urdf', 'The robot model'],
-  C: ['h', 'A C99 header for a microcontroller'],
-};
 
 const picture = () => new Promise(done => { document.getElementById('picture').toBlob(done); });
 
@@ -107,9 +100,8 @@ export class Tuning {
 
   /** The buttons that download. */
   files() {
-    const forms = Object.entries(FORMS).filter(([, [form]]) => this.mechanism.forms.includes(form));
     return element('div', { className: 'tools' }, element('span', { className: 'about', textContent: 'Download' }),
-      ...forms.map(([name, [form, title]]) => button(name, () => this.download(form), { title })));
+      ...this.mechanism.forms.map(([form, name, title]) => button(name, () => this.download(form), { title })));
   }
 
   /** Let the browser save a file. */
