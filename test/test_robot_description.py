@@ -77,6 +77,11 @@ def test_whoever_comes_late_hears_the_description_once(graph):
     graph.until(lambda: len(heard) > 1 < len(whole))
     assert len(heard) == len(whole) == 2
     assert all('xyz="1.0 0.0 0.0"' in texts[1].data for texts in (heard, whole))
+    # Where a change leaves no robot of the scene, nobody hears of the old one.
+    assert graph.set(node, jansen__only_named=True).successful
+    graph.until(lambda: len(whole) > 2)
+    late = graph.listen(String, 'robot_description', LATCHED)
+    assert graph.until(lambda: late)[0].data == whole[2].data == ''
 
 
 FILES = {'rate.yaml': 'rate: 5.0\n', 'empty.yaml': '',

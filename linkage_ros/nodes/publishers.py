@@ -23,8 +23,8 @@ class TextPublisher:
         self._publisher, self._text = node.create_publisher(String, name, LATCHED), ''
 
     def publish(self, text: str) -> None:
-        """Publish a text, unless it is empty or unchanged."""
-        if text not in ('', self._text):
+        """Publish a text if it has changed, also to an empty one."""
+        if text != self._text:
             self._text = text
             self._publisher.publish(String(data=text))
 
