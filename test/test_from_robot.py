@@ -155,7 +155,7 @@ SAID = [
     # A part that nothing drives says so, beside the mechanism that is imported.
     ('wheel_leg.urdf', [], ['--driven', 'crank_motor'],
      'thigh, shin, tendon: not driven: 1 of hip, bell_joint, knee, tendon_joint must be moved'),
-    ('toe_rod.xml', [], [], ': a ball or a free joint has no one position'),
+    ('toe_rod.xml', [], [], ': only a hinge or a slide has one position'),
     ('folded.urdf', within(0.5, 2.0), [], 'Started inside the limits of the file: motor at 0.6'),
     ('four_bar.urdf', [('</robot>', '<transmission name="t"><joint name="motr"/><joint '
                         'name="motor"/></transmission></robot>')], [],

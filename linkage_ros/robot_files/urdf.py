@@ -62,7 +62,7 @@ def read(root: Element) -> Robot:
     sdf.join(robot, root.findall('gazebo/joint'))
     for part in root.findall('gazebo'):
         sdf.obey(robot, part)
-    robot.driven = [joint.get('name', '') for joint in (
+    robot.driven += [joint.get('name', '') for joint in (
         *root.findall('transmission/joint'),
         *root.findall('ros2_control/joint[command_interface]'))]
     # URDF+ says which joints are not independent.
