@@ -51,9 +51,9 @@ PIN = '{pin_loops: [{parent: coupler, child: rocker, %s: [0.3, 0, 0]}], independ
     ('four_bar.urdf', ['--pose', 'motor'], f"'motor'{POSES}"),
     ('four_bar.urdf', ['--pose', 'elbow=0', 'motor=a'], f"'motor=a'{POSES}"),
     ('four_bar.urdf', ['--hold', 'motor=1e9'], f"'motor=1e9'{POSES}"),
-    ('four_bar.urdf', ['--hold', 'motr=1'], "there is no joint 'motr'; allowed: motor, elbow, "),
-    ('four_bar.sdf', ['--driven', 'joint_a'], "there is no joint 'joint_a'; allowed: joint_A, "),
-    ('five_bar.urdf', [], 'no joint of this robot closes a loop; those of a URDF are'),
+    ('four_bar.urdf', ['--hold', 'motr=1'], "there is no hinge or slide 'motr'; allowed: motor, "),
+    ('four_bar.sdf', ['--driven', 'joint_a'], "there is no hinge or slide 'joint_a'; allowed: "),
+    ('five_bar.urdf', [], 'no joint of this robot closes a loop: an MJCF needs a connect or '),
     *(('four_bar.urdf', ['--loops', text], why) for text, why in (
         ('{closed_loop: [{link_a: front', '/loops.yaml cannot be read: while parsing a flow'),
         (PIN % 'parent_xzy', "/loops.yaml names 'parent_xyz', which is not there\n"),
@@ -62,7 +62,8 @@ PIN = '{pin_loops: [{parent: coupler, child: rocker, %s: [0.3, 0, 0]}], independ
         ('{closures: [{link_a: x, link_b: rocker, point: [0, 0, 0], axis: [0, 1, 0]}]}',
          "/loops.yaml: joint closures[0] is on 'x', which is no link\n"),
         ('{closures: [{link_a: coupler, link_b: rocker, 7: 8}]}', "/loops.yaml names 'point'"),
-        ('{name_mot: [motr]}', "/loops.yaml: there is no joint 'motr'; allowed: motor, elbow, "),
+        ('{name_mot: [motr]}', "/loops.yaml: there is no hinge or slide 'motr'; allowed: motor, "),
+        ('{name_mot: [7]}', "/loops.yaml: there is no hinge or slide '7'; allowed: motor, elbow"),
         ('{closed_loop: [coupler, rocker]}', '/loops.yaml: closed_loop must have pairs of '),
         ('{name_mot: motor}', "/loops.yaml: name_mot must be a list, not 'motor'"),
         ('[]', '/loops.yaml: there is no key []; allowed: ')))])
@@ -138,6 +139,7 @@ def test_what_makes_no_scene_is_said(tmp_path, file, changes, why, args):
     assert why in refused(written(tmp_path, file, *changes), *args)
 
 
+PLUGIN = '<plugin name="c" filename="c"><joint_name>joint_D</joint_name></plugin>'
 SAID = [
     # The cylinder is longer than its pins can be apart.
     ('boom.urdf', [], ['--pose', 'boom_cylinder=5'],
@@ -153,8 +155,16 @@ SAID = [
     # A part that nothing drives says so, beside the mechanism that is imported.
     ('wheel_leg.urdf', [], ['--driven', 'crank_motor'],
      'thigh, shin, tendon: not driven: 1 of hip, bell_joint, knee, tendon_joint must be moved'),
-    ('toe_rod.xml', [], [], ': a ball or a free joint has no one position'),
-    ('folded.urdf', within(0.5, 2.0), [], 'Started inside the limits of the file: motor at 0.6')]
+    ('toe_rod.xml', [], [], ': only a hinge or a slide has one position'),
+    ('folded.urdf', within(0.5, 2.0), [], 'Started inside the limits of the file: motor at 0.6'),
+    ('four_bar.urdf', [('</robot>', '<transmission name="t"><joint name="motr"/><joint '
+                        'name="motor"/></transmission></robot>')], [],
+     'Not driven: motr: no joint of the file has this name; allowed: motor, elbow, shoulder; did'),
+    # A plugin's names are those of its model.
+    ('four_bar.sdf', [('<model name="four_bar">', f'<model name="m">{PLUGIN}<model name="n">'),
+                      ('<link name="AB"/>', f'{PLUGIN}<link name="AB"/>'),
+                      ('</model>', '</model></model>')], [],
+     'n::joint_C, n::joint_D; did you mean n::joint_D?\nfrom_robot: Checked: n_joint_D: in')]
 
 
 @pytest.mark.parametrize('file, changes, args, line', SAID, ids=range(len(SAID)))

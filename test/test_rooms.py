@@ -143,12 +143,17 @@ def test_every_colour_is_in_the_palette():
         assert not colours or file == PACKAGE / 'palette.py', f'{file.name} has {colours}'
 
 
-def test_what_other_folders_import_from_the_package_is_there():
-    for file in (path for folder in ('benchmark', 'demo', 'docs', 'examples')
+def test_what_other_folders_use_of_the_package_is_there():
+    for file in (path for folder in ('benchmark', 'demo', 'docs', 'examples', 'launch')
                  for path in (ROOT / folder).rglob('*.py')):
-        for node in ast.walk(parsed(file)):
+        nodes, used = [*ast.walk(parsed(file))], []
+        for node in nodes:
             if isinstance(node, ast.ImportFrom) and f'{node.module}.'.startswith('linkage_ros.'):
-                module = file_of(node.module)
                 for name in (alias.name for alias in node.names):
-                    assert file_of(f'{node.module}.{name}').exists() or re.search(
-                        rf'\b{name}\b', module.read_text()), (file, node.module, name)
+                    module = file_of(f'{node.module}.{name}')
+                    used += [(module, each.attr) for each in nodes if isinstance(
+                        each, ast.Attribute) and getattr(each.value, 'id', '') == name] \
+                        if module.exists() else [(file_of(node.module), name)]
+        for module, name in used:
+            assert name == '__doc__' or re.search(rf'\b{name}\b', module.read_text()), (
+                file, module, name)

@@ -14,7 +14,7 @@ from .motion.curves import ascending, extremes, sampled
 from .motion.reach import reachable_arcs
 from .statics import loaded_links
 from .text import joint_lines, rod_lines
-from .text.arguments import checked_branches, checked_dimensions
+from .text.arguments import checked_branches, checked_dimensions, MAX_LENGTH, MIN_LENGTH
 from .text.arithmetic import Formula
 from .text.design import Design
 from .text.rod_lines import FORMS, WindowError
@@ -23,6 +23,6 @@ from .tolerances import CLOSE, ROUNDING, TOLERANCE
 __all__ = ['Answer', 'Arc', 'ascending', 'bar_name', 'checked_branches', 'checked_dimensions',
            'CLOSE', 'Design', 'Dyads', 'extremes', 'FORMS', 'Formula',
            'GROUND', 'Hinge', 'IN_SINGLE', 'Input', 'Inverse', 'InverseLinkage', 'joint_lines',
-           'Leg', 'Link', 'LinkPoint', 'loaded_links', 'Mechanism', 'Pin',
-           'reachable_arcs', 'rod_lines', 'ROUNDING', 'sampled', 'short', 'Slide', 'Solution',
-           'spread', 'theta_of', 'TOLERANCE', 'WindowError']
+           'Leg', 'Link', 'LinkPoint', 'loaded_links', 'MAX_LENGTH', 'Mechanism', 'MIN_LENGTH',
+           'Pin', 'reachable_arcs', 'rod_lines', 'ROUNDING', 'sampled', 'short', 'Slide',
+           'Solution', 'spread', 'theta_of', 'TOLERANCE', 'WindowError']

@@ -19,7 +19,7 @@ from .. import cli, scene
 from ..linkage import short
 from ..robot_model.robot import FIXED, HINGE, MAX_NUMBER, NotDriven, Robot, SLIDE, with_positions
 from ..scene.writing import in_yaml
-from ..words import join_names, sentence, truncated
+from ..words import join_names, sentence, suggestion, truncated
 
 NAME = 'from_robot'
 # The report on a mechanism that differs from its robot, or could not be compared.
@@ -52,8 +52,12 @@ def show(args: list[str] | None) -> None:
     arguments = parser.parse_args(args)
     with np.errstate(all='ignore'):
         robot = readers.read(arguments.file, arguments.loops)
-        robot.driven = arguments.driven or robot.driven
         robot.check_names(arguments.driven or ())
+        motors, robot.driven = robot.driven, arguments.driven or robot.driven
+        for component in components(robot):
+            # Loops of which no motor is named keep those of the file.
+            if not {robot.source(name)[0] for name in component.named}.intersection(robot.driven):
+                robot.driven += [name for name in motors if name in component.named]
         robot = with_positions(robot, positions(arguments.pose))
         robot = closing.held(robot, {**robot.held, **positions(arguments.hold)})
         parameters, reports, still = described(robot)
@@ -61,7 +65,7 @@ def show(args: list[str] | None) -> None:
     head = [truncated(line, 10 ** 6) for line in (
         f'From {arguments.file}. Its joints on /joint_states, and its model:',
         _launch(arguments, still), READING)]
-    lines = [*map(sentence, reports)]
+    lines = [*dict.fromkeys(map(sentence, reports))]
     print(*(f'# {line}' for line in head + lines), in_yaml(parameters), sep='\n', end='')
     print(*(f'{NAME}: {line}' for line in lines), sep='\n', file=sys.stderr)
     if wrong := [line for line in reports if WRONG in line]:
@@ -88,6 +92,15 @@ def described(robot: Robot) -> tuple[dict[str, Any], list[str], dict[str, float]
     robot, reports = closed.robot, closed.report
     imported: list[check.Imported] = []
     groups = planar.groups(robot)
+    names = {joint.name for joint in robot.joints}
+    if unknown := [name for name in robot.driven if name not in names]:
+        reports.append(f'Not driven: {join_names(unknown, 200)}: no joint of the file has this '
+                       f'name{suggestion(unknown[0], robot.positions, 200)}')
+    if not groups:
+        # Joints that are held may leave no loop.
+        reports += {*map(str, closed.faults.values())} or [
+            'no joint of this robot closes a loop: an MJCF needs a connect or weld, an SDF a link '
+            'with two parents, a URDF an element such as loop_joint or the option --loops FILE']
     for group in groups:
         fault = next((closed.faults[joint.name] for joint in group.joints
                       if joint.name in closed.faults), None)
@@ -118,9 +131,7 @@ def _checked(robot: Robot, balls: Sequence[Sequence[str]], imported: Sequence[ch
              reports: list[str]) -> tuple[dict[str, Any], list[str], dict[str, float]]:
     """Return what is described, without mechanisms that differ from the robot."""
     if not imported:
-        raise cli.RequestError(*reports or [
-            'no joint of this robot closes a loop; those of a URDF are in a file of their own: '
-            '--loops FILE'])
+        raise cli.RequestError(*reports)
     parameters = {'mechanisms': [made.name for made in imported], **{
         key: value for made in imported for key, value in made.parameters.items()}}
     mechanisms = scene.read(parameters).mechanisms
@@ -136,11 +147,10 @@ def _checked(robot: Robot, balls: Sequence[Sequence[str]], imported: Sequence[ch
             *reports, *(f'Left out: {name}: {WRONG}: {why}.' for name, why in wrong.items())])
     reports = [*reports, *(report for made in imported for report in made.reports), *checks]
     if lost:
-        reports.append(f'Not published: {", ".join(lost)}: passive joints of loops that no '
-                       'mechanism determines. What they carry has no transform.')
+        reports.append(not_published(lost))
     if free := [joint.name for joint in robot.joints
                 if not joint.is_cut and joint.kind not in (HINGE, SLIDE, FIXED)]:
-        reports.append(f'Not published: {", ".join(free)}: a ball or a free joint has no one '
+        reports.append(f'Not published: {", ".join(free)}: only a hinge or a slide has one '
                        'position. The model of the robot has them fixed where the file has them.')
     return parameters, reports, still
 
@@ -178,6 +188,12 @@ def others(robot: Robot, mechanisms: Mapping[str, scene.SceneMechanism],
         [(crank.name, 1.0, name, zeros[name]) for name, crank in cranks.items()
          if crank.source != name],
         **{f'{crank.name}.speed': 0.0 for crank in cranks.values()})}, lost
+
+
+def not_published(names: Sequence[str]) -> str:
+    """Return the report on joints that nothing determines."""
+    return (f'Not published: {", ".join(names)}: passive joints of loops that no mechanism '
+            'determines. What they carry has no transform.')
 
 
 def positions(texts: Sequence[str]) -> dict[str, float]:

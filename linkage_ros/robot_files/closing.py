@@ -110,8 +110,7 @@ def _closed(robot: Robot, seed: int) -> Closed:
             if opening > LEANING * component.size:
                 raise ValueError(f'its loops cannot be closed: they stay open by {opening:.3g} m, '
                                  f'more than {OPEN:g} of their size')
-            if component.residual(pose[None])[0] < component.near:
-                _check_driven(component, pose, motors, followers)
+            _check_driven(component, pose, motors, followers)
         except ValueError as error:
             made.faults.update((joint.name, error) for joint in component.joints)
     return made._replace(robot=with_positions(robot, positions, moves))
@@ -274,5 +273,5 @@ def _searched(component: Component, fixed: np.ndarray, seed: int) -> np.ndarray:
     poses = spread * np.random.default_rng(seed).uniform(-1.0, 1.0, (count, len(fixed)))
     poses = component.closed(component.closed(poses, fixed, 40, 1e-2), fixed, 12)
     steps = component.displacement(component.closed(poses, fixed, 1, 1e-12) - poses)
-    at_rest = np.max(np.abs(steps), axis=1) < RESTING
+    at_rest = np.max(np.abs(steps), axis=1, initial=0.0) < RESTING
     return poses[at_rest] if at_rest.any() else poses

@@ -41,9 +41,10 @@ def read(path: str, loops: str | None = None) -> Robot:
             raise RequestError(f'each joint must have a name of its own, not {wrong[0]!r}')
     if loops:
         with needs('yaml'):
-            from yaml import safe_load, YAMLError
+            from yaml import BaseLoader, load, YAMLError
         with _blaming(loops, YAMLError), open(loops, encoding='utf-8') as file:
-            urdf.close(robot, safe_load(file))
+            # All is text, also a name of digits.
+            urdf.close(robot, load(file, BaseLoader))
     with _blaming(path):
         if far := [joint.name for joint in robot.joints
                    if not np.all(np.abs(joint.places) < MAX_NUMBER)]:

@@ -44,15 +44,17 @@ def numbers(values: str | Sequence[Any], count: int = 3) -> np.ndarray:
     return array
 
 
-def obey(robot: Robot, plugins: Iterable[Element]) -> None:
-    """Fix the links of Gazebo's DetachableJoint to each other, and note what others drive."""
-    for plugin in plugins:
+def obey(robot: Robot, model: Element, name: str = '') -> None:
+    """Fix links of a model's DetachableJoint to each other, and note what plugins drive."""
+    for plugin in model.findall('plugin'):
         kind = f'{plugin.get("name")} {plugin.get("filename")}'.lower()
         if 'detachable' in kind:
-            parent, child = (text(plugin, tag) for tag in ('parent_link', 'child_link'))
+            parent, child = (_within(name, text(plugin, tag))
+                             for tag in ('parent_link', 'child_link'))
             robot.join(f'{parent}={child}', FIXED, (parent, child), robot.frames[parent])
         if 'state' not in kind:
-            robot.driven += [(joint.text or '').strip() for joint in plugin.findall('joint_name')]
+            robot.driven += [_within(name, (joint.text or '').strip())
+                             for joint in plugin.findall('joint_name')]
 
 
 def read(root: Element) -> Robot:
@@ -77,6 +79,11 @@ def join(robot: Robot, joints: Iterable[Element]) -> None:
         model.join(robot, name, joint, model.ends(name, joint))
 
 
+def _within(model: str, name: str) -> str:
+    """Return the full name of a part of a model, or of itself; that of the whole robot is ''."""
+    return f'{model}::{name}'.removesuffix('::__model__').lstrip(':')
+
+
 def _parts(model: Element, name: str) -> Iterator[tuple[str, Element]]:
     """Yield the parts of a model and of the models in it, with their full names."""
     if model.find('include') is not None or model.get('placement_frame'):
@@ -84,7 +91,7 @@ def _parts(model: Element, name: str) -> Iterator[tuple[str, Element]]:
                            'which are not read: write the content, and a pose, in their place')
     yield name, model
     for part in model:
-        inner = f'{name}::{part.get("name", "")}'.lstrip(':')
+        inner = _within(name, part.get('name', ''))
         if part.tag == 'model':
             yield from _parts(part, inner)
         elif part.tag in ('link', 'joint', 'frame'):
@@ -108,8 +115,8 @@ class _Model:
         robot = Robot(bodies[0], {name: self.frame(name) for name in bodies})
         for name, part in joints.items():
             self.join(robot, name, part, ends[name], 0.0)
-        for model in (part for part in self._parts.values() if part.tag == 'model'):
-            obey(robot, model.findall('plugin'))
+        for name, part in self._parts.items():
+            obey(robot, part, name)
         return robot
 
     def named(self, where: str, name: str, is_model: bool = False) -> str:
@@ -117,7 +124,7 @@ class _Model:
         scope = where if is_model else where.rpartition('::')[0]
         if name == 'world':
             return name
-        full = f'{scope}::{name}'.removesuffix('::__model__').lstrip(':')
+        full = _within(scope, name)
         if full not in self._parts:
             raise RequestError(f'{where or "the model"} names {name!r}, which is not there')
         return full

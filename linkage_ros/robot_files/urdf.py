@@ -60,8 +60,9 @@ def read(root: Element) -> Robot:
     _close_by_elements(robot, root)
     _close_by_frames(robot)
     sdf.join(robot, root.findall('gazebo/joint'))
-    sdf.obey(robot, root.findall('gazebo/plugin'))
-    robot.driven = [joint.get('name', '') for joint in (
+    for part in root.findall('gazebo'):
+        sdf.obey(robot, part)
+    robot.driven += [joint.get('name', '') for joint in (
         *root.findall('transmission/joint'),
         *root.findall('ros2_control/joint[command_interface]'))]
     # URDF+ says which joints are not independent.
@@ -134,15 +135,15 @@ def close(robot: Robot, loops: Any) -> None:
     for i, ends in enumerate(loops.get('closed_loop', ())):
         if not isinstance(ends, list) or len(ends) != 2:
             raise RequestError(f'closed_loop must have pairs of names, not {short_repr(ends)}')
-        _pair(robot, '='.join(ends), str(types[i] if i < len(types) else FIXED), ends)
+        _pair(robot, '='.join(ends), types[i] if i < len(types) else FIXED, ends)
     for key, kind in (('pin_loops', HINGE), ('ball_loops', BALL)):
         for i, cut in enumerate(loops.get(key, ())):
-            robot.close(str(cut.get('name', f'{key}[{i}]')), kind, (cut['parent'], cut['child']),
+            robot.close(cut.get('name', f'{key}[{i}]'), kind, (cut['parent'], cut['child']),
                         [at(numbers(cut[f'{end}_xyz'])) for end in ('parent', 'child')],
                         numbers(cut['axis'] if kind == HINGE else '0 0 1'))
     for name, kind in (*zip(loops.get('joint_name', ()), loops.get('joint_type', ())),
                        *((name, BALL) for name in loops.get('ball_upgrades', ()))):
-        _change(robot, name, str(kind).lower())
+        _change(robot, name, kind.lower())
     # Its motors are those of the closed robot, transmissions those of the open tree.
     motors = [name for key in _MOTORS for name in loops.get(key, ())]
     robot.check_names(motors)

@@ -32,7 +32,7 @@ from . import shapes
 from .robot import FREE, HINGE, Robot, SLIDE, with_positions
 from .shapes import BALL, BOX, CYLINDER, Piece, Place, weight
 from .. import palette
-from ..linkage import Arc, extremes, GROUND, Leg, Link
+from ..linkage import Arc, extremes, GROUND, Leg, Link, MAX_LENGTH, MIN_LENGTH
 from ..scene import SceneError, SceneMechanism
 from ..scene.motion import Motion
 from ..words import join_names
@@ -48,8 +48,6 @@ STYLES = {'bar': (CYLINDER, 1 / 80, ''), shapes.ROD: (CYLINDER, 1 / 80, 'bar'),
           shapes.BLOCK: (BOX, 1 / 20, ''), 'joint': (BALL, 1 / 40, 'joint')}
 # Thickness of bars as a fraction of the longest.
 WIDTH = 1 / 40
-# Range of sizes [m] that displays can draw in single precision.
-MIN_LENGTH, MAX_LENGTH = 1e-30, 1e30
 # Density of aluminium [kg/m^3].
 DENSITY = 2700.0
 # Margin at each end of a travel: [rad], for a slide as a fraction of the longest bar.

@@ -8,6 +8,7 @@ from typing import Sequence
 from . import bodies, mjcf, sdf, urdf
 from .bodies import DENSITY
 from .. import cli, scene
+from ..linkage import MAX_LENGTH, MIN_LENGTH
 
 NAME = 'urdf'
 
@@ -23,7 +24,7 @@ def show(args: Sequence[str] | None, given_scene: scene.Scene | None = None) -> 
         NAME, description='Print the robot model of a scene.',
         epilog='`ros2 run linkage_ros urdf` also accepts the scene as a node does: '
                '--ros-args --params-file SCENE')
-    positive = cli.within(float, bodies.MIN_LENGTH, bodies.MAX_LENGTH)
+    positive = cli.within(float, MIN_LENGTH, MAX_LENGTH)
     cli.add_scene(parser, nargs='?', help="the scene's parameter file (default: the "
                                           "catalogue's linkages)")
     parser.add_argument('--format', choices=('urdf', 'sdf', 'mjcf'), default='urdf',

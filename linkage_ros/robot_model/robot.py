@@ -321,7 +321,7 @@ class Robot:
         for name in names:
             if name not in self.positions:
                 raise RequestError(
-                    f'there is no joint {name!r}{suggestion(name, self.positions, 200)}')
+                    f'there is no hinge or slide {name!r}{suggestion(name, self.positions, 200)}')
 
     def sources(self, name: str) -> list[tuple[str, float, float]]:
         """Return a joint and those that it depends on in turn, each with ratio and offset."""

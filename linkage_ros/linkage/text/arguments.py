@@ -15,7 +15,7 @@ from ...words import join_names, short_repr, suggestion
 
 # For each input of a linkage the lower and the upper end [rad or m], or None.
 Ends = Sequence[tuple[float, float] | None] | None
-# The eighth power of a length is a normal number.
+# The eighth power of a length is a normal number, and displays have it in single precision.
 MIN_LENGTH, MAX_LENGTH = 1e-30, 1e30
 
 
