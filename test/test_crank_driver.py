@@ -44,8 +44,8 @@ class Driver:
             return [m for m in self._heard if m.header.stamp.sec * SECOND
                     + m.header.stamp.nanosec == now]
 
-        found = self._graph.until(message)[0]
-        return found.position[0], found.velocity[0]
+        state = self._graph.until(message)[0]
+        return state.position[0], state.velocity[0]
 
     def back_to(self, now):
         """Set the time back and let the node notice."""
@@ -151,24 +151,24 @@ class OnSystemTime(CrankDriver):
 def on_system_time(graph):
     """Return a crank driver whose clock can be set, and what it sends; it has sent something."""
     node = graph.start(OnSystemTime, {'mechanisms': ['drop'], 'drop.type': 'water_drop'})
-    heard = graph.listen(JointState, 'crank_states')
-    graph.until(lambda: len(heard) > 2)
-    return node, heard
+    messages = graph.listen(JointState, 'crank_states')
+    graph.until(lambda: len(messages) > 2)
+    return node, messages
 
 
 @pytest.mark.parametrize('seconds, speed', [(3600, 1.0), (-1000, 1.0), (1000, 0.5)])
 def test_system_time_that_is_set_makes_no_jump_not_even_amid_a_change(
         graph, on_system_time, seconds, speed):
-    node, heard = on_system_time
-    before = heard[-1].position[0]
+    node, messages = on_system_time
+    before = messages[-1].position[0]
     node.set_by = Duration(seconds=seconds)
     if speed != 1.0:
         assert node.set_parameters([Parameter('drop.crank.speed', value=speed)])[0].successful
-    del heard[:]
+    del messages[:]
     now = node.system_time()
-    graph.until(lambda: [m for m in heard if abs(
+    graph.until(lambda: [m for m in messages if abs(
         m.header.stamp.sec * SECOND + m.header.stamp.nanosec - now) < 100 * SECOND][2:])
-    for message in heard:
+    for message in messages:
         assert 0.0 <= (message.position[0] - before) % math.tau < 2.0
     assert message.velocity[0] == speed
 

@@ -123,8 +123,8 @@ def test_bars_that_are_sums_have_their_lengths_where_they_are_nearly_equal(x, ap
     bars = f'{x}+{x} {x}+{x}+{x}-d'
     cell = linkage('A ground 0 0', f'B ground 0 -{x}', f'C crank A {x} up',
                    f'D E F inversor B C {bars}', d=x * (1.0 + apart))
-    found = cell.solve(math.pi + np.array([-5.0, 5.0, 100.0]) * apart)
-    rhombus = found['D'] + found['F'] - found['C'] - found['E']
+    places = cell.solve(math.pi + np.array([-5.0, 5.0, 100.0]) * apart)
+    rhombus = places['D'] + places['F'] - places['C'] - places['E']
     assert np.isfinite(rhombus).all() and np.abs(rhombus).max() < 1e-14
     corner = linkage('A ground 0 0', 'C crank A b', f'E rigid A C {bars} left',
                      d=x * (1.0 + apart), b=2.0 * x * apart).solve(0.7)['E']

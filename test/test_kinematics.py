@@ -52,20 +52,20 @@ UNASSEMBLED = [
 
 
 def test_what_cannot_be_assembled_is_said_with_the_reason(graph):
-    heard = graph.log()
+    logged = graph.log()
     node = graph.start(Kinematics, {'mechanisms': [f'm{i}' for i in range(len(UNASSEMBLED))], **{
-        f'm{i}.{key}': value for i, (given, *_) in enumerate(UNASSEMBLED)
-        for key, value in given.items()}})
+        f'm{i}.{key}': value for i, (parameters, *_) in enumerate(UNASSEMBLED)
+        for key, value in parameters.items()}})
     # Of the first mechanism the left leg is assembled.
     first, *_ = [graph.listen(JointState, f'{name}/joint_states')
                  for name in node.scene.mechanisms]
     graph.crank([settings.source for mechanism in node.scene.mechanisms.values()
                  for settings in mechanism.inputs.values()])(
         [position for _, positions, _ in UNASSEMBLED for position in positions], first)
-    graph.until(lambda: len({m.name for m in heard if 'cannot be' in m.msg}) == len(UNASSEMBLED))
-    for name, (*_, said) in zip(node.scene.mechanisms, UNASSEMBLED):
-        text, = {m.msg for m in heard if m.name == f'kinematics.{name}'}
-        assert text.endswith(said.format(m=name))
+    graph.until(lambda: len({m.name for m in logged if 'cannot be' in m.msg}) == len(UNASSEMBLED))
+    for name, (*_, reason) in zip(node.scene.mechanisms, UNASSEMBLED):
+        text, = {m.msg for m in logged if m.name == f'kinematics.{name}'}
+        assert text.endswith(reason.format(m=name))
 
 
 ARM = {'mechanisms': ['boom'], 'boom.type': 'custom', 'boom.scale': 2.0, 'boom.joints': [
@@ -79,18 +79,18 @@ LOOKS = {
     8: (Marker.TRIANGLE_LIST, 'EARTH', None, -2)}
 
 
-@pytest.mark.parametrize('name, given, size, ids', [
+@pytest.mark.parametrize('name, scene, size, ids', [
     ('walker', WALKER, 0.01 * 65.7, {0, 1, 2, 5, 7, 8}),
     ('lever', {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}, 270.0,
      {0, 1, 2, 3, 4, 5, 8}), ('boom', ARM, 3.2, {0, 1, 6, 7, 8})])
-def test_every_marker_looks_as_the_table_says_and_is_in_its_layer(graph, name, given, size, ids):
+def test_every_marker_looks_as_the_table_says_and_is_in_its_layer(graph, name, scene, size, ids):
     pose = [1.0, -2.0, 3.0, 0.4, -0.3, 2.5]
     node = graph.start(Kinematics, {
-        **given, f'{name}.pose': pose, f'{name}.frame_id': 'floor', 'frame_prefix': 'robot/'})
+        **scene, f'{name}.pose': pose, f'{name}.frame_id': 'floor', 'frame_prefix': 'robot/'})
     drawn, locus = graph.listen(MarkerArray, f'{name}/markers'), graph.listen(
         Marker, f'{name}/locus', LATCHED)
     mechanism, = node.scene.mechanisms.values()
-    push = graph.crank([drive.source for drive in mechanism.inputs.values()])
+    push = graph.crank([settings.source for settings in mechanism.inputs.values()])
     markers = push([0.3] if len(ids) > 5 else [2.0, 1.1], drawn).markers
     ahead, _, up = rotation(pose[3:]).T
     if 2 in ids:
@@ -143,7 +143,7 @@ SHARED = ['--ros-args', '-r', 'crank_states:=joint_states']
 
 
 def test_motors_and_passive_joints_share_a_topic_and_nobody_hears_himself(graph):
-    heard = graph.log()
+    messages = graph.log()
     graph.start(Kinematics, KNEE, cli_args=SHARED)
     said, answers = [], []
 
@@ -159,10 +159,10 @@ def test_motors_and_passive_joints_share_a_topic_and_nobody_hears_himself(graph)
         'left_shin': own['AB'], 'left_ankle': math.remainder(7.0 - own['QB'], math.tau),
         'right_lever': slid['lever'], 'right_slide': -slid['slide']})
     unknown = 'no input is called wheel; the inputs are left_knee_motor, right_hip_motor'
-    graph.until(lambda: [m for m in heard if unknown in m.msg])
+    graph.until(lambda: [m for m in messages if unknown in m.msg])
     graph.crank(['left_knee_motor'], 'joint_states')([1.0], answers)
     assert len(answers) <= len(said)
-    assert len([m for m in heard if 'no input is called' in m.msg]) == 1
+    assert len([m for m in messages if 'no input is called' in m.msg]) == 1
 
 
 # --- crank messages, however they come and whatever they say ---

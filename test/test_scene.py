@@ -65,9 +65,9 @@ def test_names_that_ros_takes_for_values_are_written_as_texts_and_empty_lists_no
                                   100 * 'w'])
 def test_a_frame_is_called_as_links_of_robots_are(tmp_path, name):
     before = scene.read({'mechanisms': ['jansen'], 'frame_id': name, 'jansen.frame_id': name})
-    _, found = rewritten(before, tmp_path)
-    assert (found.frame_id, found.mechanisms['jansen'].frame_id) == (name, name)
-    root = ElementTree.fromstring(urdf.describe(found.mechanisms.values(), name))
+    _, again = rewritten(before, tmp_path)
+    assert (again.frame_id, again.mechanisms['jansen'].frame_id) == (name, name)
+    root = ElementTree.fromstring(urdf.describe(again.mechanisms.values(), name))
     assert root.find('joint/parent').get('link') == root.find('link').get('name') == name
 
 
@@ -77,12 +77,12 @@ def test_a_branch_is_an_assembly_sign_and_0_the_usual_one():
 
 
 def test_only_more_than_one_pair_is_mirrored_by_default():
-    for given, mirrored in (({}, False), ({'leg_pairs': 2}, True), ({'mirrored': True}, True),
-                            ({'leg_pairs': 3, 'mirrored': False}, False)):
-        assert alone('jansen', **given).mirrored == mirrored
+    for settings, mirrored in (({}, False), ({'leg_pairs': 2}, True), ({'mirrored': True}, True),
+                               ({'leg_pairs': 3, 'mirrored': False}, False)):
+        assert alone('jansen', **settings).mirrored == mirrored
 
 
-@pytest.mark.parametrize('given, named', [
+@pytest.mark.parametrize('parameters, named', [
     ({'mechanisms': []}, 'mechanisms must be'),
     ({'mechanisms': ['jansen', 'jansen']}, 'mechanisms must be .* each once'),
     ({'mechanisms': ['two words']}, 'mechanisms must be .* letters'),
@@ -153,9 +153,9 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
      'own.leg_pairs must be 1 and mirrored false: only'),
     ({'jansen.joints': ['O ground 0 0']}, 'jansen.joints is not a parameter'),
 ])
-def test_a_wrong_parameter_is_named_with_what_is_allowed(given, named):
+def test_a_wrong_parameter_is_named_with_what_is_allowed(parameters, named):
     with pytest.raises(scene.SceneError, match='^' + named) as refused:
-        scene.read(given)
+        scene.read(parameters)
     assert '\n' not in str(refused.value) and len(str(refused.value)) < 600
 
 
@@ -179,8 +179,8 @@ def test_any_name_of_a_joint_can_be_quoted(name):
 
 
 def test_only_mechanisms_that_are_given_something_else_are_read_again():
-    given = {'jansen.dimensions.m': 15.0, 'peaucellier.scale': 0.1}
-    before = scene.read(given)
+    parameters = {'jansen.dimensions.m': 15.0, 'peaucellier.scale': 0.1}
+    before = scene.read(parameters)
     after = scene.changed(
         before, {'jansen.dimensions.m': 14.9, 'peaucellier.scale': 0.1}).mechanisms
     assert {name for name in after if after[name] is not before.mechanisms[name]} == {'jansen'}
@@ -235,11 +235,11 @@ SWEPT = {**SIGNED, 'own.dimensions.r': 3.0, 'own.crank.sweep': [-0.5, 0.5]}
 
 
 @pytest.mark.nightly(all_but=3)
-@pytest.mark.parametrize('given', [*TYPES.values(), SMALL, SIGNED, SWEPT, {'jansen.scale': 5e-324},
-                                   {'jansen.scale': 1e308}],
+@pytest.mark.parametrize('parameters', [
+    *TYPES.values(), SMALL, SIGNED, SWEPT, {'jansen.scale': 5e-324}, {'jansen.scale': 1e308}],
                          ids=[*TYPES, 'small', 'signed', 'swept', 'least', 'most'])
-def test_every_slider_has_its_value_between_finite_ends(given):
-    numbers = [(mechanism, p) for mechanism in scene.read(given).mechanisms.values()
+def test_every_slider_has_its_value_between_finite_ends(parameters):
+    numbers = [(mechanism, p) for mechanism in scene.read(parameters).mechanisms.values()
                for p in mechanism.parameters if p.field.kind == 'double']
     for mechanism, parameter in numbers:
         low, high = slider.ends(mechanism, parameter)
@@ -248,7 +248,7 @@ def test_every_slider_has_its_value_between_finite_ends(given):
     assert len(numbers) > 3
 
 
-@pytest.mark.parametrize('name, given, ends', [
+@pytest.mark.parametrize('name, parameters, ends', [
     *((name, {'crank.ratio': ratio}, approx(ends, abs=close)) for ratio in (-2.0, 1.0)
       for name, ends, close in (('crank.ratio', sorted((0.1 * ratio, 10.1 * ratio)), 0.2),
                                 ('crank.offset', (-math.pi, math.pi), 0.1))),
@@ -260,9 +260,9 @@ def test_every_slider_has_its_value_between_finite_ends(given):
     ('dimensions.v', {'dimensions.v': 0.5, 'joints': [
         line.replace('line O A v', 'line O A sqrt(1-v)') for line in SIGNED['own.joints']]},
      (approx(-4.0), approx(0.95, abs=0.05)))])
-def test_a_slider_goes_as_far_as_makes_sense(name, given, ends):
+def test_a_slider_goes_as_far_as_makes_sense(name, parameters, ends):
     mechanism, = scene.read({**SIGNED, **{
-        f'own.{key}': value for key, value in given.items()}}).mechanisms.values()
+        f'own.{key}': value for key, value in parameters.items()}}).mechanisms.values()
     parameter, = (p for p in mechanism.parameters if p.name == f'own.{name}')
     assert slider.ends(mechanism, parameter) == ends
 
@@ -292,17 +292,17 @@ def test_the_nodes_that_use_a_parameter_are_those_of_the_page():
     written = {name: (set(every if nodes == 'all nodes' else re.findall(
         r'`(\w+)`', nodes.partition('(')[0])), change.startswith('restart'))
         for names, nodes, change in rows for name in re.findall(r'`(\w+)`', names)}
-    found = {}
+    declared = {}
     for each in (*scene.read(ACTUATED).parameters, *scene.read({}).parameters):
         name = each.name.split('.')
         key = name[1] if name[1:2] in (['dimensions'], ['branches']) else name[-1]
         # A walker of one leg at most is no other while a node runs.
         still = key in ('leg_pairs', 'mirrored') and name[0] not in ('jansen', 'peaucellier')
-        found.setdefault(key, (set(each.field.readers), each.field.read_only and not still))
+        declared.setdefault(key, (set(each.field.readers), each.field.read_only and not still))
         assert each.field.owner in each.field.readers
         assert each.field.owner == scene.KINEMATICS or scene.KINEMATICS not in each.field.readers
         assert each.field.read_only == (written[key][1] or still), each.name
-    assert found == written
+    assert declared == written
 
 
 def test_scenes_of_the_same_values_are_equal_however_they_are_written():
@@ -314,7 +314,7 @@ def test_scenes_of_the_same_values_are_equal_however_they_are_written():
     assert few.mechanisms['jansen'] != scene.read({'jansen.scale': 0.1}).mechanisms['jansen']
 
 
-@pytest.mark.parametrize('given, reason', [
+@pytest.mark.parametrize('parameters, reason', [
     ({'own.tilt.ratio': 0.0}, 'of a size from 1e-30 to 1e30, not 0.0'),
     # With this, positions of the source were infinite.
     ({'own.tilt.ratio': -1e-310}, 'of a size from 1e-30 to 1e30, not -1e-310'),
@@ -332,9 +332,10 @@ def test_scenes_of_the_same_values_are_equal_however_they_are_written():
     *[({'jansen.loads': ['BC=1'], **more}, 'jansen.loads must be empty for more than one leg')
       for more in ({'jansen.leg_pairs': 2}, {'jansen.mirrored': True})],
 ])
-def test_settings_of_inputs_and_loads_that_cannot_be_are_refused(given, reason):
+def test_settings_of_inputs_and_loads_that_cannot_be_are_refused(parameters, reason):
+    base = ACTUATED if any(key.startswith('own') for key in parameters) else {}
     with pytest.raises(scene.SceneError) as refused:
-        scene.read({**ACTUATED, **given} if any(key.startswith('own') for key in given) else given)
+        scene.read({**base, **parameters})
     assert reason in str(refused.value)
 
 
@@ -349,8 +350,8 @@ def test_a_stroke_takes_three_seconds_by_default_and_its_lengths_are_scaled():
         assert made['tilt'].sweep is None and stroke.ends is None
         assert made['tilt'].source == 'own_tilt' and stroke.actuator == (1.0, 0.0)
     swept = scene.read({**ACTUATED, 'own.cylinder.sweep': [1, 2], 'own.cylinder.ratio': 2.0})
-    drive = swept.mechanisms['own'].inputs['cylinder']
-    assert drive.sweep == drive.ends == (1.0, 2.0) and drive.actuator == (2.0, 0.0)
+    settings = swept.mechanisms['own'].inputs['cylinder']
+    assert settings.sweep == settings.ends == (1.0, 2.0) and settings.actuator == (2.0, 0.0)
 
 
 def test_loads_are_forces_of_joints_and_moments_of_links():
@@ -441,7 +442,7 @@ def test_a_start_is_put_where_it_is_in_the_sweep_or_at_the_nearer_end(turns):
         inside = same[(low <= same) & (same <= high)]
         ends = min((abs(each - end), end) for each in same for end in (low, high))[1]
         expected = inside if len(inside) else [ends]
-        found, speed = Motion(0.5, (low, high), start, 9, turns, period).at(9)
-        assert min(abs(found - each) for each in expected) < 1e-12
+        value, speed = Motion(0.5, (low, high), start, 9, turns, period).at(9)
+        assert min(abs(value - each) for each in expected) < 1e-12
         insides += len(inside) > 0
     assert 1 < insides < 180
