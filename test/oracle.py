@@ -83,7 +83,7 @@ class Solver:
         linkage, self._joints = mechanism.linkage, self.assembly.joints
         # At an end of the reach rates divide by zero, and then all that comes with them is worked
         # out by arrays, whose last digits differ.
-        self._places, self._angles, self._rates = (linkage.function(*expected) for expected in (
+        self._places, self._angles, self._rates = (linkage.function(*names) for names in (
             (linkage.points,), ((), self._joints), ((), (), self._joints)))
         slides = {link.name for link in linkage.links if link.kind == 'prismatic'}
         self._sizes = [mechanism.scale if name in slides else 1.0 for name in self._joints]
@@ -446,18 +446,18 @@ class Bench:
             self._executor.spin_once(timeout_sec=0.005)
         return True
 
-    def listen(self, topic, expected):
+    def listen(self, topic, subscribed):
         """Begin or end to listen to a topic."""
-        if (topic in self.listeners) == expected:
+        if (topic in self.listeners) == subscribed:
             return
-        if expected:
+        if subscribed:
             kind = MarkerArray if topic.endswith('/markers') else JointState
             self.listeners[topic] = self._subscribe(topic, kind, 1000)
         else:
             self._graph.node.destroy_subscription(self.listeners.pop(topic).subscription)
         publisher = next(p for p in self.node.publishers
                          if p.topic_name == self._graph.node.resolve_topic_name(topic))
-        assert self._until(lambda: publisher.get_subscription_count() == int(expected))
+        assert self._until(lambda: publisher.get_subscription_count() == int(subscribed))
         self._drain()
 
     def compiled(self):
@@ -643,8 +643,8 @@ class Generator:
 
     def __init__(self, parameters, random):
         self._random, self._scene = random, scene.read(parameters)
-        self._drives = [(mechanism, settings) for mechanism in self._scene.mechanisms.values()
-                        for settings in mechanism.inputs.values()]
+        self._settings = [(mechanism, settings) for mechanism in self._scene.mechanisms.values()
+                          for settings in mechanism.inputs.values()]
         self.topics = ['joint_states', *(f'{name}/{kind}' for name in self._scene.mechanisms
                                          for kind in ('joint_states', 'markers'))]
         self._settable = [p for p in self._scene.parameters if scene.KINEMATICS in p.field.readers]
@@ -674,9 +674,9 @@ class Generator:
                     steps.append(('send', self._message(self._pick(sources), moving)))
         return steps
 
-    def _along_an_end(self, drives, moving):
+    def _along_an_end(self, sources, moving):
         """Yield messages of inputs that go in and out of their reach, and then stay outside."""
-        by_name = {settings.source: settings for _, settings in drives}
+        by_name = {settings.source: settings for _, settings in sources}
         inside = self._random.integers(1, 12)
         for i in range(inside + 3):
             positions = [
@@ -690,11 +690,11 @@ class Generator:
     def _arrangement(self):
         """Return the inputs that a source tells of."""
         share = self._pick([0.0, 0.6, 1.0])
-        chosen = [settings for settings in self._drives if self._random.random() < share]
-        return chosen or [self._pick(self._drives)]
+        chosen = [settings for settings in self._settings if self._random.random() < share]
+        return chosen or [self._pick(self._settings)]
 
-    def _message(self, drives, moving):
-        by_name = {settings.source: (mechanism, settings) for mechanism, settings in drives}
+    def _message(self, sources, moving):
+        by_name = {settings.source: (mechanism, settings) for mechanism, settings in sources}
         positions = [self._position(*each) for each in by_name.values()]
         # Now and then the other way round.
         moving ^= self._random.random() < 0.05
@@ -741,8 +741,8 @@ class Generator:
 
     def _odd(self):
         """Return bytes that are another message than usual, or none."""
-        names = [self._pick(self._drives)[1].source for _ in range(self._random.integers(1, 4))]
-        positions = [self._position(*next((m, d) for m, d in self._drives if d.source == name))
+        names = [self._pick(self._settings)[1].source for _ in range(self._random.integers(1, 4))]
+        positions = [self._position(*next((m, d) for m, d in self._settings if d.source == name))
                      for name in names]
         velocities = [self._speed() for _ in names]
         kind = self._random.integers(10)

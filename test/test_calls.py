@@ -14,6 +14,7 @@ from linkage_ros.linkage import Answer, Solution
 import numpy as np
 import pytest
 from test_language import made
+from truth.cases import CASES
 
 WRONG = 'x', ['x'], None, {}, object(), b'3', 10 ** 400, 1j, [[1.0], 'x']
 
@@ -133,6 +134,8 @@ def test_sides_of_rods_are_checked_whatever_drives():
 
 def test_pieces_of_the_first_of_several_inputs_are_for_others_that_are_given(arm):
     (low, *_), *_, (_, high, *_) = arm.monotone('P.x', [1.0])
+    # An angle turns by half a turn at most in each.
+    assert np.abs(np.diff(mechanisms.create('whitworth').monotone('lever'))[:, 2]).max() <= math.pi
     np.testing.assert_allclose([[low, high]], arm.reach(1.0))
     with pytest.raises(ValueError, match='the values of all except the first'):
         arm.monotone('P.x')
@@ -202,6 +205,9 @@ def test_an_answer_prints_its_inputs_its_mode_and_its_margin(arm):
     assert repr(inverse) == '<inverse of five_bar for P.x, P.y>'
     assert isinstance(answer, Solution) and ' at 0x' not in str([answer])
     assert Answer is Solution  # as it was called
+    # A motor on a crank turns off to the left of that, then to the right.
+    assert [answer.mode for answer in CASES['elbow motor'].linkage().inputs_for(
+        ('B.x', 'B.y'), (0.4, 0.3))] == ['crank2+ det+', 'crank2- det-']
 
 
 # --- what they cost beside the inverse below them ---

@@ -80,8 +80,8 @@ def test_outputs_of_several_mechanisms_in_one_message(stream, graph):
                 return float(four_bar.joint_angles(crank, [name])[name])
 
             # Of a name that comes twice the last counts, as in crank_states.
-            assert stream.want(['flap', 'somebody_else', name, 'flap'], [
-                    0.1, 9.0, output(crank), flap(servo)], [9.0, 9.0, 0.2, 0.3]) == {
+            assert stream.want(['old_lever_A.x', 'flap', name, 'flap'], [
+                    9.0, 0.1, output(crank), flap(servo)], [9.0, 9.0, 0.2, 0.3]) == {
                 'bar_crank': (pytest.approx(crank, abs=1e-12),
                               pytest.approx(0.2 / slope(output, crank), rel=1e-7)),
                 'servo': (pytest.approx(servo, abs=1e-13),
@@ -100,7 +100,9 @@ def test_the_first_command_is_next_to_where_the_crank_is(stream, graph):
         stream.want(['flap'], [flap(servo)])
     four_bar = mechanisms.create('four_bar')
     rocker = float(four_bar.joint_angles(-1.9)['QB'])
-    assert stream.want(['bar_QB'], [rocker])['bar_crank'] == (pytest.approx(-1.9, abs=1e-9),)
+    # Velocities without names are none.
+    assert stream.want(['bar_QB'], [rocker], [0.1, 0.2]) == {
+        'bar_crank': (pytest.approx(-1.9, abs=1e-9),)}
 
 
 def test_what_cannot_be_had_is_held_and_said(stream, capfd):
@@ -229,6 +231,8 @@ def test_of_several_inputs_no_command_outlives_a_change_of_the_geometry(graph, c
     graph.change(stream.node, parameters, leg__dimensions__a=0.085)
     commands = stream.want(names, [*far, *far, 1.2])
     assert commands == {name: at for name, at in good.items() if not name.startswith('leg')}
+    graph.change(stream.node, parameters, other__scale=1.1)
+    assert stream.want(names, [*far, *far, 1.2]).keys() == {'bar_crank'}
     assert stream.want([FOOT[0], 'bar_QB'], [9.0, 1.2]).keys() == {'bar_crank'}
     assert f'leg has 2 inputs: name 2 of its outputs, not {FOOT[0]}' in capfd.readouterr().err
 
@@ -337,11 +341,17 @@ def test_a_trajectory_that_cannot_be_is_refused_as_a_whole(graph, plan, capfd):
         Duration(sec=sec, nanosec=nanosec) for sec, nanosec in times]
     assert not any(point.velocities for point in good.points)
     assert not any(one() for one in refused)
+    # Where an output turns back it may stand still.
+    extreme, = graph.until(plan(['bar_A.x'], ([40.0], [0.0])))
+    assert extreme.points[0].velocities.tolist() == [0.0]
 
 
 @pytest.mark.parametrize('stream', [SEVERAL], indirect=True)
-def test_a_newer_trajectory_ends_the_older_one(graph, plan):
+def test_a_newer_trajectory_ends_the_older_one_and_no_later_point_jumps(graph, plan, capfd):
     # Alone, the older one takes seconds, however late the newer one comes.
     older = plan(FOOT + BUCKET, *[(LINE.tolist(), [])] * 10_000)
     newer = plan(FOOT, (LINE[:2].tolist(), []))
     assert graph.until(newer) and not older()
+    # Only another assembly mode comes to this side of the ground bar.
+    plan(FOOT, (LINE[:2].tolist(), []), ([0.01, 0.04], []))
+    graph.until(lambda: 'the way to P.x, P.y at 0.01, 0.04 leads' in capfd.readouterr().err)

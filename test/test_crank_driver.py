@@ -78,6 +78,10 @@ MOTIONS = {
     'a new start puts the crank there': (
         {**DROP, 'drop.crank.speed': 0.0}, (1, (0.0, 0.0)), {'drop__crank__start': 1.25},
         (2, (1.25, 0.0))),
+    'a joint that moves two inputs does what the last of them says': (
+        {**DROP, 'mechanisms': ['drop', 'bars'], 'bars.type': 'four_bar',
+         'bars.crank.source': 'drop_crank', 'bars.crank.speed': -0.5, 'bars.crank.start': 2.0},
+        (1, (2.0, -0.5)), (2, (1.5, -0.5))),
     'an end of a range may be rounded': (
         DROP, {'drop__crank__speed': 100.00001}, (1, (0.0, 100.00001))),
     'simulated time may leap ahead': (

@@ -174,11 +174,12 @@ def test_the_end_of_a_long_period_has_a_pose_a_period_away_too(ratio):
 @pytest.mark.parametrize('distance, answers', [(-1e-3, 2), (-1e-9, 2), (-1e-14, 1), (1e-10, 1),
                                                (1e-8, 0), (1e-3, 0)])
 def test_next_to_an_extreme_values_have_two_solutions_or_its_own_or_none(distance, answers):
-    crank = mechanisms.create('slider_crank', a=40.0, b=120.0, c=0.0)
-    solutions = crank.inverse('block').all(160.0 + distance * crank.longest)
-    assert len(solutions) == answers
-    if answers == 1:
-        assert solutions[0].inputs == (0.0,)
+    engine = mechanisms.create('slider_crank', a=40.0, b=120.0, c=0.0)
+    crank = mechanisms.create('custom', joints=['O ground -1 0', 'A crank O 1'])
+    for linkage, output, extreme in (engine, 'block', 160.0), (crank, 'A.x', 0.0):
+        solutions = linkage.inverse(output).all(extreme + distance * linkage.longest)
+        assert len(solutions) == answers
+        assert answers != 1 or solutions[0].inputs == (0.0,)
 
 
 def test_the_jacobian_has_a_row_for_each_output():

@@ -46,7 +46,7 @@ LOADED = {
         'mechanisms': ['a', 'b'], 'b.type': 'slotted_lever', 'b.loads': ['L=0 -9.81'],
         'a.type': 'custom', 'a.joints': ['O ground 0 0', 'P ground 1 0', 'B cylinder P O 1 left'],
         'a.loads': ['OB=-1.0'], 'a.cylinder.source': 'a_crank'}}
-ANKLE = SCENES['rods in space']
+ANKLE, OUT = SCENES['rods in space'], SCENES['legs that are left out now and then']
 MEASURED = {'mechanisms': ['a', 'b'], 'a.type': 'four_bar', 'a.crank.measures': 'QB',
             'a.crank.ratio': 2.0, 'a.crank.offset': 0.1, 'a.crank.start': 0.5,
             'b.type': 'slotted_lever'}
@@ -58,8 +58,10 @@ SHORT = {
     'markers that a change leaves nothing of': (LEG, [
         *everything(LEG), message({'m_crank': 0.5}), ('set', {'m.points': ['O', 'G']})]),
     'an input of two': (FIVE_BAR, [
-        *everything(FIVE_BAR), message({'m_crank': 0.5}), message({'m_crank': 0.6}),
-        message({'m_crank2': 0.1}), ('set', {'frame_id': 'map'})]),
+        *everything(FIVE_BAR), message({'m_crank': 0.5}), message({'m_crank': 0.6}, [1.0]),
+        message({'m_crank2': 0.1}, [1.0, 2.0]), ('set', {'frame_id': 'map'}),
+        ('set', {'frame_prefix': 'left/'})]),
+    'a leg that is left out': (OUT, [*everything(OUT), message({'m_crank': 0.1}, [1.0])]),
     # What was received is read anew.
     **{f'what was received of a {source} before a change': (MEASURED, [
         *everything(MEASURED), GOOD, OTHER, ('set', change)]) for source, change in (

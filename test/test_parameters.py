@@ -276,14 +276,14 @@ def test_a_set_among_a_thousand_mechanisms_costs_what_it_changes():
 
 def test_each_of_many_sets_gets_its_own_answer(graph):
     node = graph.start(Slow, LEG)
-    expected = [('leg.scale', 2), ('leg.scale', -1.0), ('leg.scale', 'wide'),
-                ('leg.branches.C', 7), ('frame_id', 'map'), ('leg.type', 'klann'),
-                ('leg.pose', None)]
+    changes = [('leg.scale', 2), ('leg.scale', -1.0), ('leg.scale', 'wide'),
+               ('leg.branches.C', 7), ('frame_id', 'map'), ('leg.type', 'klann'),
+               ('leg.pose', None)]
     client = Client(graph, node)
-    results = client.set(*expected)
+    results = client.set(*changes)
     # Each value is valid by itself or not; the valid ones are set together or not at all.
     assert [r.successful for r in results] == [True, False, False, False, True, False, False]
-    for (name, _), result in zip(expected[:-2], results):
+    for (name, _), result in zip(changes[:-2], results):
         assert result.successful or result.reason.startswith(f'{name} must')
     assert 'read-only parameter: leg.type' in results[-2].reason
     assert results[-1].reason.startswith('leg.pose cannot be removed; it must be a list of')

@@ -55,11 +55,11 @@ def test_one_robot_state_publisher_sees_all_loops_of_the_scene_closed(graph):
 
 
 def test_frames_of_another_robot_make_no_robot_of_the_scene(graph):
-    messages = graph.log()
+    texts = graph.log()
     graph.until(lambda: graph.node.count_publishers('/rosout'))
     graph.start(Kinematics, {**ROBOT, 'foot.only_named': False})
     whole = graph.listen(String, 'robot_description', LATCHED)
-    message = graph.until(lambda: [m.msg for m in messages if 'robot_description' in m.msg])[0]
+    message = graph.until(lambda: [m.msg for m in texts if 'robot_description' in m.msg])[0]
     assert 'frame_id must be the same for all' in message and 'torso, shin' in message
     assert not whole
 

@@ -43,14 +43,14 @@ def mjcf(ankle, limits, pins=None, ref=0.0):
               for low, high in (np.transpose(limits).tolist() if limits is not None
                                 else ((0, 0), (0, 0)))]
     ties = ''.join(f'<connect site1="eye {i}" site2="pin {i}"/>' for i in (0, 1))
-    settings = ''.join(f'<motor joint="{name}"/>' for name in 'lr')
+    motors = ''.join(f'<motor joint="{name}"/>' for name in 'lr')
     return (
         '<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="shin">'
         f'{LIGHT}<joint name="knee" axis="0 1 0"/><body name="cross" pos="{text(ankle.first)}">'
         f'<joint name="pitch" axis="{text(ankle.first_axis)}" {ranges[0]}/>{LIGHT}'
         f'<body name="foot" pos="{less(ankle.second, ankle.first)}"><joint name="roll" '
         f'axis="{text(ankle.second_axis)}" {ranges[1]}/>{LIGHT}{eyes}</body></body>{legs}</body>'
-        f'</worldbody><equality>{ties}</equality><actuator>{settings}</actuator></mujoco>')
+        f'</worldbody><equality>{ties}</equality><actuator>{motors}</actuator></mujoco>')
 
 
 def turning(seed):
@@ -198,7 +198,7 @@ def test_limits_of_its_motors_are_sweeps(tmp_path):
 @pytest.mark.parametrize('seed, motors', [(1, {}), (2, {'l': '-1.5 1.5'})])
 def test_the_sweeps_of_an_ankle_s_motors_are_in_its_window(tmp_path, seed, motors):
     mechanism, drives = limited(tmp_path, seed, ([-0.5, -0.3], [0.4, 0.3]), **motors)
-    ends = [settings.ends for settings in drives.values()]
+    ends = [input_.ends for input_ in drives.values()]
     assert np.ptp(ends, axis=1).min() > 0.1
     values = np.meshgrid(*(np.linspace(*each, 50) for each in ends))
     assert np.isfinite(list(mechanism.linkage.joint_angles(values).values())).all()

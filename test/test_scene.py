@@ -113,8 +113,9 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'jansen.crank.speed': 101.0}, 'jansen.crank.speed must be .* from -100 to 100'),
     ({'jansen.crank.sweep': [1.0]}, 'jansen.crank.sweep must be .* lower end and the higher end'),
     ({'jansen.crank.sweep': [1e16, 1e16 + 8.0]}, r'jansen.crank.sweep must be .* within 1e\+06'),
-    ({'peaucellier.crank.sweep': [-1.2, 1.0]},
-     r'peaucellier.crank.sweep must be inside the reach \[-1.17137, 1.17137\] rad'),
+    *[({'peaucellier.crank.sweep': sweep},
+       r'peaucellier.crank.sweep must be inside the reach \[-1.17137, 1.17137\] rad')
+      for sweep in ([-1.2, 1.0], [-1.0, 1.2])],
     ({'rate': -1.0}, 'rate must be .* from 0 to 1000'),
     ({'rate': 10 ** 5000}, 'rate must be .* from 0 to 1000'),
     ({'qos_overrides./crank_states.publisher.depth': 5}, 'qos_overrides.* is not a parameter'),
@@ -149,8 +150,9 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'mechanisms': ['own'], 'own.type': 'rods', 'own.joints': G1, 'own.loads': ['R_roll=1 -2']},
      "own.loads: the load of R_roll must have the components x, y, z, not 'R_roll=1 -2'"),
     ({**OWN, 'own.joints': ['Base ground 0 0', 'A crank base 1']}, r'.*; did you mean Base\?$'),
-    ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O 1', 'B crank O 1'], 'own.mirrored': True},
-     'own.leg_pairs must be 1 and mirrored false: only'),
+    *[({**OWN, 'own.joints': [*joints, 'A crank O 1'], 'own.mirrored': True},
+       'own.leg_pairs must be 1 and mirrored false: only')
+      for joints in (['O ground 0 0', 'B crank O 1'], ['O ground 1 0'])],
     ({'jansen.joints': ['O ground 0 0']}, 'jansen.joints is not a parameter'),
 ])
 def test_a_wrong_parameter_is_named_with_what_is_allowed(parameters, named):
@@ -254,6 +256,8 @@ def test_every_slider_has_its_value_between_finite_ends(parameters):
                                 ('crank.offset', (-math.pi, math.pi), 0.1))),
     # Grashof: with bars 1, r, 3 and a base of 4 the crank turns where r is from 2 to 6.
     ('dimensions.r', {'dimensions.r': 3.0}, approx((2.1, 5.9), abs=0.1)),
+    # In this sweep a tenth of it will do.
+    ('dimensions.r', {'dimensions.r': 3.0, 'crank.sweep': [-0.5, 0.5]}, approx((0.3, 6), abs=0.2)),
     # What nothing limits is changed by nine times itself.
     ('dimensions.v', {}, approx((-3.0, 2.4), abs=0.06)),
     # Beyond 1 the length is no number.
@@ -410,6 +414,7 @@ def test_a_change_of_speed_makes_no_jump(sweep, speed):
 
 def test_a_change_of_sweep_goes_on_the_same_way():
     motion = Motion(1.0, (-0.5, 0.25), 0.1)
+    assert [motion.is_repeated(turns) for turns in (0.5, 1.0, 2.0)] == [False, True, True]
     for now in range(10 ** 8, 10 ** 10, 10 ** 9 // 3):
         wider = motion.changed(1.0, (-0.75, 0.5), 1, now)
         assert wider.at(now) == pytest.approx(motion.at(now), abs=1e-15)
@@ -429,6 +434,12 @@ def test_an_end_of_the_reach_is_within_it_any_turn_and_nothing_beyond_is():
                     beyond = leg.side * outwards * 2e-12
                     assert legs.within_reach(crank)[i]
                     assert not legs.within_reach(crank + beyond)[i]
+
+
+def test_the_locus_is_that_of_the_tracer_or_last_point_on_the_widest_arc():
+    assert [alone('jansen', points=[*names]).tracer for names in ('GA', 'BA')] == ['G', 'A']
+    legs = LegGroup(mechanisms.create('four_bar'), reach=[(0.0, 0.1), (1.0, 2.0), (3.0, 3.5)])
+    assert np.angle(legs.locus('A')[[0, -1]] @ (1.0, 1j)) == approx([1.0, 2.0])
 
 
 @pytest.mark.parametrize('turns', [True, False])

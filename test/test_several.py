@@ -166,15 +166,15 @@ def test_a_place_to_start_from_may_be_anything():
 
 
 def test_answers_lie_in_the_sweeps_or_the_reason_says_so():
-    expected = InverseRequest(alone('five_bar', crank__sweep=[6.0, 9.0]), ('P.x', 'P.y'))
-    answers = expected.answers((0.05, 0.15), (0.0, 0.0))
+    request = InverseRequest(alone('five_bar', crank__sweep=[6.0, 9.0]), ('P.x', 'P.y'))
+    answers = request.answers((0.05, 0.15), (0.0, 0.0))
     assert answers and all(6.0 <= inputs[0] <= 9.0 for inputs, _ in answers)
     assert answers[0][0][0] == pytest.approx(min(inputs[0] for inputs, _ in answers))
-    nearest, _, _ = expected.command((0.05, 0.15), None, (0.0, 0.0), jumps=True)
+    nearest, _, _ = request.command((0.05, 0.15), None, (0.0, 0.0), jumps=True)
     assert nearest == pytest.approx(answers[0][0])
-    expected = InverseRequest(alone('five_bar', crank__sweep=[3.0, 3.5]), ('P.x', 'P.y'))
-    assert expected.answers((0.05, 0.15), (3.2, 0.0)) == []
-    assert expected.reason(0.05, 0.15) == (
+    request = InverseRequest(alone('five_bar', crank__sweep=[3.0, 3.5]), ('P.x', 'P.y'))
+    assert request.answers((0.05, 0.15), (3.2, 0.0)) == []
+    assert request.reason(0.05, 0.15) == (
         'P.x, P.y at 0.05, 0.15 needs the crank at 1.74732 rad, crank2 at 1.58104 rad, outside '
         'crank.sweep [3, 3.5]')
 
@@ -187,11 +187,11 @@ def test_an_output_that_stands_still_in_most_poses_is_answered_where_it_moves():
         'G dyad A F d4 d4 right', 'H line F G d6', 'J K L inversor A F d7 2.0073'],
         d1=2.2362640741019026, d2=0.8931826658923526, d3=0.8931826658923615, d4=2.6947387147872717,
         d6=5.557896960568358, d7=0.8324685908048884)
-    settings = 2.403985938284456
+    length = 2.403985938284456
     for crank in (1.45, 2.5):
-        value = float(linkage.solve((crank, settings))['J'][1])
-        moves = abs(float(linkage.velocity((crank, settings))['J'][1])) > 1e-9
-        inputs = linkage.input_for('J.y', value, others=(settings,))
+        value = float(linkage.solve((crank, length))['J'][1])
+        moves = abs(float(linkage.velocity((crank, length))['J'][1])) > 1e-9
+        inputs = linkage.input_for('J.y', value, others=(length,))
         assert moves == (crank == 1.45) == (np.nanmin(abs(inputs - crank), initial=9.0) < 1e-9)
 
 

@@ -120,6 +120,8 @@ def test_plates_are_triangles_of_bars_that_are_not_flat(name):
                 if bars.issuperset(map(frozenset, combinations(corners, 2)))
                 and area(*corners) > 1e-6 * linkage.longest ** 2}
     plates = shapes.plates(linkage, names)
+    small = linkage.with_dimensions(**{key: 1e-12 * x for key, x in linkage.dimensions.items()})
+    assert shapes.plates(small, names) == plates
     assert {*map(frozenset, plates)} == expected and len(plates) == len(expected)
     assert len(expected) == {'jansen': 2, 'gripper': 1, 'Cassie': 1, 'flat': 0}[name]
     some = [point for point in names if point not in next(iter(expected), 'A')]

@@ -21,10 +21,10 @@ CONFIGS = [path.stem for path in EXAMPLES if path.parent.name == 'config']
 
 
 def simulated(name):
-    """Return a mechanism of about a metre that starts in the middle of its reach."""
+    """Return a mechanism of half a metre that starts in the middle of its reach."""
     mechanism = {**MECHANISMS, **FROM_CASES}[name]()
     parameters = {**{each.name: each.value for each in mechanism.parameters if each.value != ()},
-                  'm.scale': mechanism.scale / bodies.size(mechanism)}
+                  'm.scale': 0.5 * mechanism.scale / bodies.size(mechanism)}
     mechanism = scene.read({'mechanisms': ['m'], **parameters}).mechanisms['m']
     rows = input_rows(mechanism)
     parameters.update((f'm.{key}.start', value) for key, value in zip(

@@ -136,8 +136,9 @@ CHOICES = [
     ([*GEARED[:3], 'D crank Q 0.27 geared crank -2 -1.4', GEARED[4]], {}, [], 1,
      [(-2.0 * crank - 1.4, crank) for crank in (0.4, -6.4)]),
     # What does not count turns is within one with its offset.
-    (LIFT, {'joint_names': ['QB=wheel+3.0']}, ['wheel'], 0,
-     [(0.5, math.remainder(READING + 3.1, math.tau))]),
+    *((LIFT, {'joint_names': [f'QB={sign}3.0']}, ['wheel'], 0,
+       [(0.5, side * math.remainder(READING + 3.1, math.tau))])
+      for sign, side in (('wheel+', 1.0), ('-wheel-', -1.0))),
     # A sensor repeats after a turn of what it measures; a geared one counts turns.
     *((LIFT, {'crank.measures': 'QB', 'crank.ratio': ratio, 'crank.offset': 0.1,
               'crank.start': 0.5}, ['crank'], 0,

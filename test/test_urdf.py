@@ -44,7 +44,7 @@ MECHANISMS = {
     'five-bar with a block': lambda: tilted(FIVE_BAR, scale=1.0),
     'engine with zeros elsewhere': lambda: tilted(ENGINE, leg_pairs=2, joint_names=[
         'crank=-m_crank+0.3', 'left0_block=-m_left0_block+0.7', 'right1_block=m_right1_block-2',
-        'right0_AB=-m_right0_AB', 'left1_AB=m_left1_AB+2.5']),
+        'right0_AB=-m_right0_AB+9', 'left1_AB=m_left1_AB+3']),
     'swinging block on the ground': lambda: tilted(SWINGING_BLOCK),
     'boom': lambda: tilted(ON_BOOM[:4], scale=2.0),
     'boom and arm': lambda: tilted(ON_BOOM, scale=2.0),
@@ -173,6 +173,9 @@ def test_limits_are_what_textbooks_give_and_a_millionth():
 def test_a_crank_that_cannot_turn_ends_with_its_reach():
     end = 2.0 * math.acos(5.0 / 6.0)
     assert limits(tilted('peaucellier'))['crank'] == pytest.approx((-end, end), abs=1e-15)
+    # Of two arcs no joint can have both.
+    assert limits(tilted('peaucellier', dimensions__r=10.0))['crank'] == pytest.approx(
+        (-2.0 * math.acos(0.25), 2.0 * math.acos(0.25)), abs=1e-15)
     later = limits(tilted('peaucellier', crank__sweep=[math.tau - 1.0, math.tau + 1.0]))
     assert later['crank'] == pytest.approx((math.tau - end, math.tau + end), abs=4e-15)
 

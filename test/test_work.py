@@ -24,13 +24,13 @@ def work(monkeypatch):
     done = Counter()
     make = LegGroup.solution
 
-    def counted(assembly, *expected):
-        solution = make(assembly, *expected)
+    def counted(assembly, *names):
+        solution = make(assembly, *names)
         solve = solution.solve
 
-        def run(*settings):
-            done[(assembly.linkage.type, *(len(part or ()) for part in expected[:3]))] += 1
-            return solve(*settings)
+        def run(*inputs):
+            done[(assembly.linkage.type, *(len(part or ()) for part in names[:3]))] += 1
+            return solve(*inputs)
 
         solution.solve = run
         return solution

@@ -480,13 +480,13 @@ def followed(subject):
             return float(mechanism.joint_angles(given, [output])[output])
 
         for near in rng.choice(subject.values, 10).tolist():
-            expected = value(near) + rng.uniform(-0.2, 0.2) * scale
+            target = value(near) + rng.uniform(-0.2, 0.2) * scale
             inputs, _ = mechanism.inverse(names).follow(
-                (expected, *subject.held), (near, *subject.held))
-            gap = value(inputs[0]) - expected if math.isfinite(inputs[0]) else 0.0
+                (target, *subject.held), (near, *subject.held))
+            gap = value(inputs[0]) - target if math.isfinite(inputs[0]) else 0.0
             gap = math.remainder(gap, math.tau) if mechanism.is_angle(output) else gap
             if not abs(gap) < 1e-6 * scale:
-                yield 'followed', f'{output} to {expected!r} from {near!r}: {inputs} is {gap} off'
+                yield 'followed', f'{output} to {target!r} from {near!r}: {inputs} is {gap} off'
 
 
 # --- forces -------------------------------------------------------------------------------------
