@@ -312,9 +312,10 @@ class Model:
                        called.sign * effort)
 
     def drawing(self, name):
-        """Return a stamp (low, high) [ns] and the points of each marker, None without any."""
+        """Return a stamp (low, high) [ns], the points of each marker and where they are."""
         pose, state = self._pose(name), self.states[name]
-        return pose and (state.stamp, self.solvers[name].points(pose, state.values))
+        return pose and (state.stamp, self.solvers[name].points(pose, state.values),
+                         self.frames[name], self.scene.mechanisms[name].pose)
 
     def locus(self, name):
         """Return the points of a mechanism's curve; with its mirror image, the ends of lines."""

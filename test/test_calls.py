@@ -16,6 +16,9 @@ import pytest
 from test_language import made
 from truth.cases import CASES
 
+RODS = mechanisms.create('rods', joints=(
+    'O motor ground at 0 0 0 axis 0 0 1', 'S slide ground at 1 0 0 axis 1 0 0',
+    'R rod O 0 0.5 0 S 1.5 0 0.1'))
 WRONG = 'x', ['x'], None, {}, object(), b'3', 10 ** 400, 1j, [[1.0], 'x']
 
 
@@ -100,9 +103,6 @@ def test_what_is_no_number_is_refused_with_its_name(bars, arm, wrong):
     'angle(A)', 'angle(A,B,C)', 'distance(A, B)', 'A.z', '', 'distance', '(A,B)', 7,
     np.array(['QB', 'AB'])])
 def test_what_is_no_output_joint_or_package_is_refused_with_its_name(bars, wrong):
-    ankle = mechanisms.create('rods', joints=(
-        'O motor ground at 0 0 0 axis 0 0 1', 'S slide ground at 1 0 0 axis 1 0 0',
-        'R rod O 0.5 0 0 S 1.5 0 0.1'))
     assert not bars.has_output(wrong) and not bars.moves(wrong)
     for call, text in (
             (lambda: bars.is_angle(wrong), 'has no output'),
@@ -113,23 +113,20 @@ def test_what_is_no_output_joint_or_package_is_refused_with_its_name(bars, wrong
             (lambda: bars.function(xp='x' if wrong is None else wrong), 'xp must be a package'),
             (lambda: bars.inverse('QB').function(wrong), 'xp must be a package'),
             (lambda: bars.velocity(0.1, by=wrong), 'by must be the number of an input, from 0'),
-            (lambda: ankle.is_angle(wrong), 'allowed: O, S, O_origin.x'),
+            (lambda: RODS.is_angle(wrong), 'allowed: O, S, O_origin.x'),
             (lambda: LEVER.mechanisms['lever'].assembly().solution((), (wrong,)), 'joint'),
             (lambda: bars.driven_by(wrong), 'can be driven by 1 of none in a plane, not by'),
-            (lambda: ankle.driven_by(wrong), 'can be driven by 1 of O, S, not by')):
+            (lambda: RODS.driven_by(wrong), 'can be driven by 1 of O, S, not by')):
         with pytest.raises(ValueError, match=text):
             call()
 
 
 def test_sides_of_rods_are_checked_whatever_drives():
-    lever = mechanisms.create('rods', joints=(
-        'O motor ground at 0 0 0 axis 0 0 1', 'S slide ground at 1 0 0 axis 1 0 0',
-        'R rod O 0 0.5 0 S 1.5 0 0.1'))
-    assert lever.driven_by('S', branches={'R': -1}).branches == {'R': -1}
+    assert RODS.driven_by('S', branches={'R': -1}).branches == {'R': -1}
     for wrong, text in (({'R': 5}, 'branch R must be'), ({'X': 1}, "has no branch 'X'"),
                         ('R', 'branches must be a mapping')):
         with pytest.raises(ValueError, match=text):
-            lever.driven_by('S', branches=wrong)
+            RODS.driven_by('S', branches=wrong)
 
 
 def test_pieces_of_the_first_of_several_inputs_are_for_others_that_are_given(arm):
@@ -139,11 +136,6 @@ def test_pieces_of_the_first_of_several_inputs_are_for_others_that_are_given(arm
     np.testing.assert_allclose([[low, high]], arm.reach(1.0))
     with pytest.raises(ValueError, match='the values of all except the first'):
         arm.monotone('P.x')
-
-
-def test_a_function_for_arrays_of_dimensions_is_refused(bars):
-    with pytest.raises(ValueError, match='one set of dimensions, not for arrays'):
-        bars.with_dimensions(a=[1.0, 1.1]).function('B')
 
 
 def test_there_are_as_many_numbers_as_inputs(bars, arm):
@@ -375,12 +367,13 @@ def test_a_linkage_stays_what_it_was_created_as():
             own['B'] = 1
 
 
-def test_questions_about_the_reach_are_for_one_set_of_dimensions():
+def test_questions_about_the_reach_and_functions_are_for_one_set_of_dimensions():
     linkage = made(b=np.array([3.0, 3.1]))
     boom = mechanisms.create('custom', r=[1.0, 1.1], joints=(
         'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O r right'))
-    for call in (linkage.reach, linkage.dead_points, lambda: linkage.input_for('QB', 1.0),
-                 boom.dead_points, lambda: boom.extremes('B.x', [(0.8, 0.9)])):
+    for call in (linkage.function, linkage.reach, linkage.dead_points,
+                 lambda: linkage.input_for('QB', 1.0), boom.dead_points,
+                 lambda: boom.extremes('B.x', [(0.8, 0.9)])):
         with pytest.raises(ValueError, match='for one set of dimensions, not for arrays'):
             call()
 

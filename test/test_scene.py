@@ -17,7 +17,7 @@ from linkage_ros.scene.motion import Motion
 import numpy as np
 import pytest
 from pytest import approx
-from scenes import alone, EXAMPLES, G1, ROOT
+from scenes import alone, BOOM, EXAMPLES, G1, ROOT
 
 OWN = {'mechanisms': ['own'], 'own.type': 'custom'}
 YEAR = 365 * 86400 * 10 ** 9
@@ -187,12 +187,6 @@ def test_only_mechanisms_that_are_given_something_else_are_read_again():
         before, {'jansen.dimensions.m': 14.9, 'peaucellier.scale': 0.1}).mechanisms
     assert {name for name in after if after[name] is not before.mechanisms[name]} == {'jansen'}
     assert [p.name for p in scene.changed(before, {'rate': 9.0}).changed_from(before)] == ['rate']
-
-
-def test_a_crank_that_cannot_turn_swings_within_its_reach():
-    mechanism = alone('peaucellier')
-    (low, high), = mechanism.reach
-    assert mechanism.first.sweep == pytest.approx((0.98 * low, 0.98 * high))
 
 
 def test_a_crank_swings_in_the_arc_that_its_start_is_in():
@@ -434,6 +428,9 @@ def test_an_end_of_the_reach_is_within_it_any_turn_and_nothing_beyond_is():
                     beyond = leg.side * outwards * 2e-12
                     assert legs.within_reach(crank)[i]
                     assert not legs.within_reach(crank + beyond)[i]
+    boom = LegGroup(mechanisms.create('custom', joints=BOOM), scale=2.0)
+    assert [boom.within_reach(2.0 * (end + step)) for end in boom.reach[0] for step in (
+        -1e-6, 1e-6)] == [[False], [True], [True], [False]]
 
 
 def test_the_locus_is_that_of_the_tracer_or_last_point_on_the_widest_arc():

@@ -44,7 +44,7 @@ MECHANISMS = {
     'five-bar with a block': lambda: tilted(FIVE_BAR, scale=1.0),
     'engine with zeros elsewhere': lambda: tilted(ENGINE, leg_pairs=2, joint_names=[
         'crank=-m_crank+0.3', 'left0_block=-m_left0_block+0.7', 'right1_block=m_right1_block-2',
-        'right0_AB=-m_right0_AB+9', 'left1_AB=m_left1_AB+3']),
+        'right0_AB=-m_right0_AB', 'left1_AB=m_left1_AB+2.5']),
     'swinging block on the ground': lambda: tilted(SWINGING_BLOCK),
     'boom': lambda: tilted(ON_BOOM[:4], scale=2.0),
     'boom and arm': lambda: tilted(ON_BOOM, scale=2.0),
@@ -163,6 +163,10 @@ def test_limits_are_what_textbooks_give_and_a_millionth():
     swing = math.asin(80.0 / 150.0)
     assert lever['crank'] is None
     assert lever['lever'] == spare(-swing, swing) and lever['slide'] == spare(0.7, 2.3, 2.7)
+    # What is wrapped is within half a turn, or has none.
+    for zero, ends in (8.5, spare(8.5 - math.tau - swing, 8.5 - math.tau + swing)), (3.0, None):
+        wrapped = tilted('slotted_lever', joint_names=[f'lever=-m_lever+{zero}'])
+        assert limits(wrapped)['lever'] == ends
     engine = limits(tilted('slider_crank'))
     assert engine['AB'] is None
     assert engine['block'] == spare(*(
