@@ -83,7 +83,7 @@ class Solver:
         linkage, self._joints = mechanism.linkage, self.assembly.joints
         # At an end of the reach rates divide by zero, and then all that comes with them is worked
         # out by arrays, whose last digits differ.
-        self._places, self._angles, self._rates = (linkage.function(*wanted) for wanted in (
+        self._places, self._angles, self._rates = (linkage.function(*names) for names in (
             (linkage.points,), ((), self._joints), ((), (), self._joints)))
         slides = {link.name for link in linkage.links if link.kind == 'prismatic'}
         self._sizes = [mechanism.scale if name in slides else 1.0 for name in self._joints]
@@ -94,50 +94,52 @@ class Solver:
 
     def pose(self, values, speeds):
         """Return the pose at inputs and, if they are known, their speeds; None if it is none."""
-        near, legs = True, []
+        within, legs = True, []
         if self.assembly.is_limited:
-            near = self.assembly.within_reach(values[0])
+            within = self.assembly.within_reach(values[0])
         moving = speeds is not None and bool(np.isfinite(speeds).all())
         for number, (prefix, leg) in enumerate(self.assembly.legs.items()):
             places, angles, rates = self._leg(leg, values, speeds if moving else None)
             if (np.isfinite([*values, *angles]).all() and np.isfinite(places).all()
-                    and np.broadcast_to(near, len(self.assembly.legs))[number]):
+                    and np.broadcast_to(within, len(self.assembly.legs))[number]):
                 legs.append(Leg(prefix, number, places, angles, rates))
         moving = moving and all(math.isfinite(rate) for leg in legs for rate in leg.rates)
         return Pose(legs, moving) if legs else None
 
     def _leg(self, leg, values, speeds):
         inputs = self.mechanism.linkage.inputs
-        own = [leg.start + leg.side * (value - leg.lag) if input_.is_angle else value / leg.size
-               for value, input_ in zip(values, inputs)]
+        inputs_ = [leg.start + leg.side * (value - leg.lag) if input_.is_angle
+                   else value / leg.size
+                   for value, input_ in zip(values, inputs)]
         axes = len(self.mechanism.linkage.axes)
-        found = self._places(*own)
+        coordinates = self._places(*inputs_)
         places = [(x * (leg.side * leg.size), *(part * leg.size for part in others))
-                  for x, *others in zip(*(found[i::axes] for i in range(axes)))]
-        angles = [leg.side * angle * size for angle, size in zip(self._angles(*own), self._sizes)]
+                  for x, *others in zip(*(coordinates[i::axes] for i in range(axes)))]
+        angles = [leg.side * angle * size
+                  for angle, size in zip(self._angles(*inputs_), self._sizes)]
         if speeds is None:
             return places, angles, []
-        rates = self._rates(*own)
-        own = [speed if input_.is_angle else speed / leg.size
-               for speed, input_ in zip(speeds, inputs)]
+        rates = self._rates(*inputs_)
+        inputs_ = [speed if input_.is_angle else speed / leg.size
+                   for speed, input_ in zip(speeds, inputs)]
         by = [rates[i * len(angles):(i + 1) * len(angles)] for i in range(len(inputs))]
         return places, angles, [
-            sum((row[j] * speed for row, speed in zip(by, own)), 0.0) * self._sizes[j]
+            sum((row[j] * speed for row, speed in zip(by, inputs_)), 0.0) * self._sizes[j]
             for j in range(len(angles))]
 
     def points(self, pose, values):
         """Return the points of each marker by its id, leg by leg."""
-        spots = self._placed(values)
-        found = {}
+        link_points = self._placed(values)
+        points = {}
         for id_, pieces in self.shown.items():
             # Each side's legs stand on one ground.
             legs = {leg.prefix[:1] if id_ == GROUND else leg.number: leg
                     for leg in reversed(pose.legs)}
-            found[id_] = [
-                spots[leg.number][point] if isinstance(point, LinkPoint)
+            points[id_] = [
+                link_points[leg.number][point] if isinstance(point, LinkPoint)
                 else leg.places[self.mechanism.linkage.points.index(point)]
                 for leg in reversed(legs.values()) for piece in pieces for point in piece]
-        return found
+        return points
 
     def _placed(self, values):
         """Return where the spots are, by leg; no other public function places them."""
@@ -148,21 +150,21 @@ class Solver:
 
 def _shown(mechanism):
     """Return what each marker shows, by its id: joints, ends of lines or corners."""
-    linkage, wanted = mechanism.linkage, mechanism.points
+    linkage, names = mechanism.linkage, mechanism.points
     if mechanism.in_space:
         arms = [bar for bar in linkage.bars if bar[0].removesuffix('_origin') in mechanism.inputs]
         return {0: [bar for bar in linkage.bars if bar not in arms],
-                1: [(name,) for name in wanted], 5: arms}
-    cranks, plates = shapes.cranks(linkage), shapes.plates(linkage, wanted)
+                1: [(name,) for name in names], 5: arms}
+    cranks, plates = shapes.cranks(linkage), shapes.plates(linkage, names)
     edges = {frozenset(edge) for plate in plates for edge in combinations(plate, 2)}
     bars = [bar for bar in linkage.bars if bar not in cranks and frozenset(bar) not in edges]
-    pieces = {0: [*bars, *linkage.cylinders], 1: [(name,) for name in wanted], 3: [], 4: [],
-              5: cranks, 6: [], 7: plates, 8: shapes.marks(linkage, wanted)}
-    for shape in shapes.drawn(mechanism, wanted):
+    pieces = {0: [*bars, *linkage.cylinders], 1: [(name,) for name in names], 3: [], 4: [],
+              5: cranks, 6: [], 7: plates, 8: shapes.marks(linkage, names)}
+    for shape in shapes.drawn(mechanism, names):
         id_ = 3 if shape.kind == shapes.GUIDE else 6 if shape.slide.name in mechanism.inputs else 4
         pieces[id_].append((shape.start, shape.end))
     drawn = {id_: [piece for piece in several if all(
-        isinstance(point, LinkPoint) or point in wanted for point in piece)]
+        isinstance(point, LinkPoint) or point in names for point in piece)]
         for id_, several in pieces.items()}
     return {id_: several for id_, several in drawn.items() if several}
 
@@ -174,9 +176,9 @@ class State:
     values: list
     speeds: list
     stamp: tuple = (0, 0)
-    # The last input that a measured value gave, and what each source has said last.
-    near: float = None
-    said: dict = field(default_factory=dict)
+    # The last input that a measured value gave; the last position and speed of each source.
+    seed: float = None
+    received: dict = field(default_factory=dict)
 
 
 class Model:
@@ -184,44 +186,45 @@ class Model:
 
     def __init__(self, parameters):
         self.stamp = (0, 0)
-        self._take(scene.read(parameters))
+        self._adopt(scene.read(parameters))
         # A default is that of the start.
-        self._given = {parameter.name: parameter.value for parameter in self.scene.parameters}
+        self._values = {parameter.name: parameter.value for parameter in self.scene.parameters}
         self.states = {name: State([None] * len(mechanism.inputs), [None] * len(mechanism.inputs))
                        for name, mechanism in self.scene.mechanisms.items()}
 
-    def _take(self, new):
+    def _adopt(self, new):
         frames = {name: mechanism.frame_id or new.frame_id
                   for name, mechanism in new.mechanisms.items()}
         robots = {name: bodies.robot([mechanism], frames[name])
                   for name, mechanism in new.mechanisms.items() if not mechanism.in_space}
         self.descriptions = {name: urdf.write(robots[name]) if name in robots else ''
                              for name in new.mechanisms}
-        own = [robot for name, robot in robots.items() if not new.mechanisms[name].only_named]
+        robots_ = [robot for name, robot in robots.items() if not new.mechanisms[name].only_named]
         try:
-            whole = urdf.write(bodies.merged(own)) if own else ''
+            description = urdf.write(bodies.merged(robots_)) if robots_ else ''
         except scene.SceneError:
-            whole = ''
+            description = ''
         # What is latched stays where a change leaves no robot of one root.
-        self.description = whole or getattr(self, 'description', '')
+        self.description = description or getattr(self, 'description', '')
         self.scene, self.frames = new, {name: new.frame_prefix + f for name, f in frames.items()}
         self.solvers = {name: Solver(mechanism) for name, mechanism in new.mechanisms.items()}
         for name in new.mechanisms:
             bodies.size(new.mechanisms[name])
 
-    def said(self, message, now):
-        """Take over joint states that came at a time (low, high) [ns]; return what they move."""
-        where = dict(zip(message.name, range(len(message.position))))
-        known = len(message.velocity) == len(message.name)
+    def receive(self, message, now):
+        """Receive joint states that came at a time (low, high) [ns]; return what they move."""
+        indices = dict(zip(message.name, range(len(message.position))))
+        moving = len(message.velocity) == len(message.name)
         stamp = message.header.stamp
         at = (stamp.sec * 10 ** 9 + stamp.nanosec,) * 2 if stamp.sec or stamp.nanosec else now
         moved = []
         for name, mechanism in self.scene.mechanisms.items():
-            for i, drive in enumerate(mechanism.inputs.values()):
-                if drive.source in where:
-                    place = where[drive.source]
-                    self._source(self.states[name], mechanism, i, drive, message.position[place],
-                                 message.velocity[place] if known else None)
+            for i, settings in enumerate(mechanism.inputs.values()):
+                if settings.source in indices:
+                    index = indices[settings.source]
+                    speed = message.velocity[index] if moving else None
+                    self._source(self.states[name], mechanism, i, settings,
+                                 message.position[index], speed)
                     moved.append(name)
         for name in moved:
             self.states[name].stamp = at
@@ -229,11 +232,12 @@ class Model:
             self.stamp = at
         return set(moved)
 
-    def _source(self, state, mechanism, i, drive, position, known):
-        value, speed = mechanism.from_source(drive, position, known, state.near)
-        state.values[i], state.speeds[i], state.said[i] = value, speed, (position, known)
+    def _source(self, state, mechanism, i, settings, position, speed):
+        state.received[i] = position, speed
+        value, state.speeds[i] = mechanism.from_source(settings, position, speed, state.seed)
+        state.values[i] = value
         if math.isfinite(value):
-            state.near = value
+            state.seed = value
 
     def change(self, values):
         """Return the reason to refuse a change, '' if it is accepted, and what it changes."""
@@ -244,19 +248,19 @@ class Model:
                 return 'unknown', set()
             if declared[name].read_only:
                 return 'read-only', set()
-        given = {**self._given, **{name: scene.plain(v) for name, v in values.items()}}
+        values_ = {**self._values, **{name: scene.plain(v) for name, v in values.items()}}
         before = self._signatures()
         try:
-            self._take(scene.read(given))
+            self._adopt(scene.read(values_))
         except scene.SceneError as error:
             return str(error), set()
-        self._given = given
+        self._values = values_
         changed = {name for name, signature in self._signatures().items()
                    if signature != before[name]}
         for name in changed:
             mechanism, state = self.scene.mechanisms[name], self.states[name]
-            for i, said in state.said.items():
-                self._source(state, mechanism, i, [*mechanism.inputs.values()][i], *said)
+            for i, received in state.received.items():
+                self._source(state, mechanism, i, [*mechanism.inputs.values()][i], *received)
         return '', changed
 
     def _signatures(self):
@@ -308,9 +312,10 @@ class Model:
                        called.sign * effort)
 
     def drawing(self, name):
-        """Return a stamp (low, high) [ns] and the points of each marker, None without any."""
+        """Return a stamp (low, high) [ns], the points of each marker and where they are."""
         pose, state = self._pose(name), self.states[name]
-        return pose and (state.stamp, self.solvers[name].points(pose, state.values))
+        return pose and (state.stamp, self.solvers[name].points(pose, state.values),
+                         self.frames[name], self.scene.mechanisms[name].pose)
 
     def locus(self, name):
         """Return the points of a mechanism's curve; with its mirror image, the ends of lines."""
@@ -442,18 +447,18 @@ class Bench:
             self._executor.spin_once(timeout_sec=0.005)
         return True
 
-    def listen(self, topic, wanted):
+    def listen(self, topic, subscribed):
         """Begin or end to listen to a topic."""
-        if (topic in self.listeners) == wanted:
+        if (topic in self.listeners) == subscribed:
             return
-        if wanted:
+        if subscribed:
             kind = MarkerArray if topic.endswith('/markers') else JointState
             self.listeners[topic] = self._subscribe(topic, kind, 1000)
         else:
             self._graph.node.destroy_subscription(self.listeners.pop(topic).subscription)
         publisher = next(p for p in self.node.publishers
                          if p.topic_name == self._graph.node.resolve_topic_name(topic))
-        assert self._until(lambda: publisher.get_subscription_count() == int(wanted))
+        assert self._until(lambda: publisher.get_subscription_count() == int(subscribed))
         self._drain()
 
     def compiled(self):
@@ -473,7 +478,7 @@ class Bench:
         except Exception:
             # Each middleware has errors of its own.
             message = None
-        moved = self.model.said(message, (before, self._now())) if message else set()
+        moved = self.model.receive(message, (before, self._now())) if message else set()
         self._check(moved, bool(moved))
 
     def _now(self):
@@ -565,8 +570,8 @@ class Bench:
         return shown
 
     def _same_joints(self, topic, message, content):
-        told = map(list, (message.name, message.position, message.velocity, message.effort))
-        assert content and (*told,) == content[1], topic
+        published = map(list, (message.name, message.position, message.velocity, message.effort))
+        assert content and (*published,) == content[1], topic
         self._same_stamp(topic, message.header.stamp, content[0])
 
     def _same_stamp(self, topic, stamp, expected):
@@ -582,11 +587,11 @@ class Bench:
         assert content, f'{topic}: drawn where it cannot be assembled'
         mechanism = self.model.scene.mechanisms[topic.partition('/')[0]]
         axes = mechanism.linkage.axes
-        found = {marker.id: [tuple(getattr(p, axis) for axis in axes) for p in marker.points]
+        drawn = {marker.id: [tuple(getattr(p, axis) for axis in axes) for p in marker.points]
                  for marker in markers}
-        wanted = {id_: [tuple(point) for point in points] for id_, points in content[1].items()}
-        for id_ in {*found} | {*wanted}:
-            own, other = found.get(id_), wanted.get(id_)
+        expected = {id_: [tuple(point) for point in points] for id_, points in content[1].items()}
+        for id_ in {*drawn} | {*expected}:
+            own, other = drawn.get(id_), expected.get(id_)
             if own and other and id_ == GROUND:
                 own, other = ({*zip(*[iter(points)] * 3)} for points in (own, other))
             assert own == other, f'{topic}: marker {id_}'
@@ -639,8 +644,8 @@ class Generator:
 
     def __init__(self, parameters, random):
         self._random, self._scene = random, scene.read(parameters)
-        self._drives = [(mechanism, drive) for mechanism in self._scene.mechanisms.values()
-                        for drive in mechanism.inputs.values()]
+        self._settings = [(mechanism, settings) for mechanism in self._scene.mechanisms.values()
+                          for settings in mechanism.inputs.values()]
         self.topics = ['joint_states', *(f'{name}/{kind}' for name in self._scene.mechanisms
                                          for kind in ('joint_states', 'markers'))]
         self._settable = [p for p in self._scene.parameters if scene.KINEMATICS in p.field.readers]
@@ -670,14 +675,14 @@ class Generator:
                     steps.append(('send', self._message(self._pick(sources), moving)))
         return steps
 
-    def _along_an_end(self, drives, moving):
+    def _along_an_end(self, sources, moving):
         """Yield messages of inputs that go in and out of their reach, and then stay outside."""
-        by_name = {drive.source: drive for _, drive in drives}
+        by_name = {settings.source: settings for _, settings in sources}
         inside = self._random.integers(1, 12)
         for i in range(inside + 3):
             positions = [
-                (drive.reach[0][1] + (2e-3 * self._random.normal() if i < inside else 4e-3)
-                 - drive.offset) / drive.ratio for drive in by_name.values()]
+                (settings.reach[0][1] + (2e-3 * self._random.normal() if i < inside else 4e-3)
+                 - settings.offset) / settings.ratio for settings in by_name.values()]
             yield 'send', self._text([*by_name], positions, [1.0] * len(by_name) * moving)
 
     def _pick(self, several):
@@ -686,11 +691,11 @@ class Generator:
     def _arrangement(self):
         """Return the inputs that a source tells of."""
         share = self._pick([0.0, 0.6, 1.0])
-        chosen = [drive for drive in self._drives if self._random.random() < share]
-        return chosen or [self._pick(self._drives)]
+        chosen = [settings for settings in self._settings if self._random.random() < share]
+        return chosen or [self._pick(self._settings)]
 
-    def _message(self, drives, moving):
-        by_name = {drive.source: (mechanism, drive) for mechanism, drive in drives}
+    def _message(self, sources, moving):
+        by_name = {settings.source: (mechanism, settings) for mechanism, settings in sources}
         positions = [self._position(*each) for each in by_name.values()]
         # Now and then the other way round.
         moving ^= self._random.random() < 0.05
@@ -713,17 +718,17 @@ class Generator:
             return float(self._pick([*SPECIAL, 1e308]))
         return float(self._random.normal())
 
-    def _position(self, mechanism, drive):
+    def _position(self, mechanism, settings):
         if self._random.random() < 0.05:
             return float(self._pick(SPECIAL))
-        value = self._input(drive)
-        if drive.measures:
-            value = float(mechanism.to_source(drive, value, 0.0)[0])
+        value = self._input(settings)
+        if settings.measures:
+            value = float(mechanism.to_source(settings, value, 0.0)[0])
             return value if math.isfinite(value) else float(self._random.normal())
-        return (value - drive.offset) / drive.ratio
+        return (value - settings.offset) / settings.ratio
 
-    def _input(self, drive):
-        low, high = drive.arcs[self._random.integers(len(drive.arcs))]
+    def _input(self, settings):
+        low, high = settings.arcs[self._random.integers(len(settings.arcs))]
         kind = self._random.random()
         if kind < 0.2:
             # Next to an end, where a sensor's noise goes in and out.
@@ -732,13 +737,13 @@ class Generator:
         if kind < 0.35:
             wide = 0.3 * (high - low)
             return float(self._random.uniform(low - wide, high + wide))
-        turns = math.tau * self._random.integers(-2, 3) if drive.input.is_angle else 0.0
+        turns = math.tau * self._random.integers(-2, 3) if settings.input.is_angle else 0.0
         return float(self._random.uniform(low, high) + turns)
 
     def _odd(self):
         """Return bytes that are another message than usual, or none."""
-        names = [self._pick(self._drives)[1].source for _ in range(self._random.integers(1, 4))]
-        positions = [self._position(*next((m, d) for m, d in self._drives if d.source == name))
+        names = [self._pick(self._settings)[1].source for _ in range(self._random.integers(1, 4))]
+        positions = [self._position(*next((m, d) for m, d in self._settings if d.source == name))
                      for name in names]
         velocities = [self._speed() for _ in names]
         kind = self._random.integers(10)

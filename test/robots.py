@@ -78,8 +78,8 @@ def imported(file, *args):
 
 def published(mechanism, **motors):
     """Return the positions of a robot's joints where its motors are, motors included."""
-    values = [drive.ratio * motors[drive.source] + drive.offset
-              for drive in mechanism.inputs.values()]
+    values = [settings.ratio * motors[settings.source] + settings.offset
+              for settings in mechanism.inputs.values()]
     angles = mechanism.linkage.joint_angles(values if len(values) > 1 else values[0])
     assert mechanism.only_named
     return {**motors, **{called.name: float(called.of(angles[link]))

@@ -145,11 +145,11 @@ class Graph:
 
     def change(self, follower, parameters, **values):
         """Set parameters on a `kinematics` of these parameters, and wait until a node follows."""
-        wanted = {name.replace('__', '.'): scene.plain(value) for name, value in values.items()}
+        expected = {name.replace('__', '.'): scene.plain(value) for name, value in values.items()}
         owner = next((node for node in self._nodes if isinstance(node, Kinematics)), None)
-        assert self.set(owner or self.start(Kinematics, parameters), **wanted).successful
-        self.until(lambda: wanted == {one.name: one.value for one in follower.scene.parameters
-                                      if one.name in wanted})
+        assert self.set(owner or self.start(Kinematics, parameters), **expected).successful
+        self.until(lambda: expected == {one.name: one.value for one in follower.scene.parameters
+                                        if one.name in expected})
 
     def call(self, client, request):
         """Return what a service answers."""

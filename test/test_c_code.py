@@ -67,10 +67,10 @@ def compiled(folder, mechanisms, single=False):
 
 def solved(library, mechanism, inputs, kind=np.float64):
     """Return what C makes of inputs (poses, n): pose and rates, and whether all is assembled."""
-    given = np.ascontiguousarray(inputs, kind)
+    arguments = np.ascontiguousarray(inputs, kind)
     out = np.zeros((len(inputs), len(fields(mechanism)) * (inputs.shape[1] + 1)), kind)
     return out, [library[f'{mechanism.name}_posed'](*(ctypes.c_void_p(x.ctypes.data) for x in row))
-                 for row in zip(given, out)]
+                 for row in zip(arguments, out)]
 
 
 def expected(mechanism, inputs):
@@ -188,12 +188,12 @@ def test_the_inverse_finds_the_nearest_input(inverses, i):
 def check_nearest(mechanism, invert, output, inputs=None, nears=None, beside=None, close=2e-14,
                   parts=None):
     """Check that C finds inputs of an output, and none that is farther away than Python's."""
-    linkage, drive, rng = mechanism.linkage, mechanism.first, np.random.default_rng(2)
-    unit, size = mechanism.scale_of(drive.input.name), mechanism.scale_of(output)
-    low, high = drive.ends or drive.reach[0]
+    linkage, settings, rng = mechanism.linkage, mechanism.first, np.random.default_rng(2)
+    unit, size = mechanism.scale_of(settings.input.name), mechanism.scale_of(output)
+    low, high = settings.ends or settings.reach[0]
     inputs = inputs or np.clip(low + (high - low) * np.array(
         rng.uniform(size=12) if parts is None else parts), low, high)
-    turn = drive.input.is_angle * math.tau
+    turn = settings.input.is_angle * math.tau
     beside = beside or rng.uniform(-0.3, 0.3, 2) * (high - low) + turn * rng.integers(-3, 4, 2)
     taken = []
 
@@ -302,14 +302,14 @@ def named(number):
             'q', 'p', 'near', 'value', 'x0', 'new', 'for', 'sin', 'double', 'NAN', 'linux'))}}
     loads = {'l0': ['B=0 -9.81'], 'l1': ['B=3 0', 'A=0 1', 'QB=0'],
              'l2': ['C=1 2', 'AB=-0.0', 'B=0 0']}
-    given = {'mechanisms': [*lines, *loads]}
-    for name in given['mechanisms']:
-        given |= {f'{name}.type': 'custom', f'{name}.joints': [*base, *lines.get(name, bars)],
-                  f'{name}.loads': loads.get(name, [])}
+    parameters = {'mechanisms': [*lines, *loads]}
+    for name in parameters['mechanisms']:
+        parameters |= {f'{name}.type': 'custom', f'{name}.joints': [*base, *lines.get(name, bars)],
+                       f'{name}.loads': loads.get(name, [])}
     outputs = {'Arm': ['Arm_Tip', 'angle(Arm,Tip)', 'Arm_Tip'], 'm0': ['q'], 'm1': ['A.x'],
                'l0': ['QB'], 'l1': ['B.y'], 'l2': ['C.x']}
     text = header.printed([header.Request(mechanism, outputs.get(name, ())) for name, mechanism
-                           in scene.read(given).mechanisms.items()], number == 'float')
+                           in scene.read(parameters).mechanisms.items()], number == 'float')
     assert ' Arm_for_angle_Arm_Tip_2 =' in text and 'slide_x_2;' in text
     return text
 

@@ -14,7 +14,11 @@ from linkage_ros.linkage import Answer, Solution
 import numpy as np
 import pytest
 from test_language import made
+from truth.cases import CASES
 
+RODS = mechanisms.create('rods', joints=(
+    'O motor ground at 0 0 0 axis 0 0 1', 'S slide ground at 1 0 0 axis 1 0 0',
+    'R rod O 0 0.5 0 S 1.5 0 0.1'))
 WRONG = 'x', ['x'], None, {}, object(), b'3', 10 ** 400, 1j, [[1.0], 'x']
 
 
@@ -35,7 +39,7 @@ def arm():
 def test_one_value_of_any_type_gives_floats(bars, number):
     value, near = 1.0, 0.5
     inverse = bars.inverse('QB')
-    for wanted, found in (
+    for expected, result in (
             (bars.servo_for('QB', value), bars.servo_for('QB', number(value))),
             (bars.servo_for('QB', value, near), bars.servo_for('QB', number(value), number(near))),
             (bars.follow('QB', value, near), bars.follow('QB', number(value), number(near))),
@@ -43,26 +47,26 @@ def test_one_value_of_any_type_gives_floats(bars, number):
                 'QB', number(value), number(near)),)),
             (inverse.nearest(value)[0], inverse.nearest([number(value)])[0]),
             (inverse.nearest((value,), near)[1], inverse.nearest(number(value), number(near))[1])):
-        assert found == wanted and {*map(type, found)} == {float}
+        assert result == expected and {*map(type, result)} == {float}
 
 
 def test_integers_are_numbers(bars, arm):
     assert bars.servo_for('QB', 1) == bars.servo_for('QB', 1.0)
     assert bars.input_for('P.x', 50, near=1) == bars.input_for('P.x', 50.0, near=1.0)
     assert arm.reach(2) == arm.reach(2.0) and arm.dead_points(np.int64(2)) == arm.dead_points(2.0)
-    given = {'jansen.leg_pairs': np.int64(2), 'jansen.pose': np.zeros(6), 'rate': np.float32(1.0)}
-    assert scene.read(given) == scene.read({'jansen.leg_pairs': 2, 'rate': 1.0})
+    values = {'jansen.leg_pairs': np.int64(2), 'jansen.pose': np.zeros(6), 'rate': np.float32(1.0)}
+    assert scene.read(values) == scene.read({'jansen.leg_pairs': 2, 'rate': 1.0})
 
 
 @pytest.mark.parametrize('shape', [(), (1,), (3, 2), (0,)])
 def test_results_have_the_shape_of_value_and_near(bars, shape):
     value, near = np.full(shape, 1.0), np.full(shape, 0.5)
     assert np.shape(bars.input_for('QB', value)) == (*shape, 2 if value.size else 1)
-    for found in (bars.input_for('QB', value, 0.5), bars.input_for('QB', 1.0, near),
-                  *bars.servo_for('QB', value, near), *bars.servo_for('QB', value)):
-        assert np.shape(found) == shape
-        np.testing.assert_array_equal(found, np.full(shape, found.flat[0] if shape and value.size
-                                                     else found))
+    for result in (bars.input_for('QB', value, 0.5), bars.input_for('QB', 1.0, near),
+                   *bars.servo_for('QB', value, near), *bars.servo_for('QB', value)):
+        assert np.shape(result) == shape
+        np.testing.assert_array_equal(result, np.full(shape, result.flat[0] if shape and value.size
+                                                      else result))
     assert bars.acceleration(value, 2.0, 0.0, ('B',))['B'].shape == (*shape, 2)
     assert bars.joint_accelerations(value, 2.0, 0.0)['QB'].shape == shape
 
@@ -72,7 +76,7 @@ def test_results_have_the_shape_of_value_and_near(bars, shape):
 @pytest.mark.parametrize('wrong', WRONG)
 def test_what_is_no_number_is_refused_with_its_name(bars, arm, wrong):
     one, two = bars.inverse('QB'), arm.inverse(('P.x', 'P.y'))
-    for ask, name in (
+    for call, name in (
             (lambda: one.all(wrong), 'values'), (lambda: two.all([0.1, wrong]), 'values'),
             (lambda: one.over(wrong), 'values'), (lambda: two.over(0.1, wrong), 'values'),
             (lambda: one.nearest(wrong), 'values'), (lambda: two.nearest([0.1, wrong]), 'values'),
@@ -85,13 +89,13 @@ def test_what_is_no_number_is_refused_with_its_name(bars, arm, wrong):
             (lambda: arm.distance_to_dead_point(0.1, wrong), 'others'),
             (lambda: arm.input_for('P.x', 0.1, others=[wrong]), 'others'),
             (lambda: arm.extremes('P.x', others=[wrong]), 'others'),
-            *((lambda ask=ask: getattr(arm, ask)([0.1, wrong]), 'theta') for ask in (
+            *((lambda call=call: getattr(arm, call)([0.1, wrong]), 'theta') for call in (
                 'solve', 'velocity', 'joint_angles', 'joint_rates', 'transmission_angles')),
             *((lambda x=x: bars.solve(x), 'theta') for x in (wrong, bytearray(b'3'))),
             (lambda: bars.servo_for('QB', wrong), 'values'),
             (lambda: bars.input_for('QB', wrong), 'value')):
         with pytest.raises(ValueError, match=name):
-            ask()
+            call()
 
 
 @pytest.mark.parametrize('wrong', [
@@ -99,11 +103,8 @@ def test_what_is_no_number_is_refused_with_its_name(bars, arm, wrong):
     'angle(A)', 'angle(A,B,C)', 'distance(A, B)', 'A.z', '', 'distance', '(A,B)', 7,
     np.array(['QB', 'AB'])])
 def test_what_is_no_output_joint_or_package_is_refused_with_its_name(bars, wrong):
-    ankle = mechanisms.create('rods', joints=(
-        'O motor ground at 0 0 0 axis 0 0 1', 'S slide ground at 1 0 0 axis 1 0 0',
-        'R rod O 0.5 0 0 S 1.5 0 0.1'))
     assert not bars.has_output(wrong) and not bars.moves(wrong)
-    for ask, text in (
+    for call, text in (
             (lambda: bars.is_angle(wrong), 'has no output'),
             (lambda: bars.input_for(wrong, 1.0), 'four_bar has no'),
             (lambda: bars.extremes(wrong), 'has no output'),
@@ -112,35 +113,29 @@ def test_what_is_no_output_joint_or_package_is_refused_with_its_name(bars, wrong
             (lambda: bars.function(xp='x' if wrong is None else wrong), 'xp must be a package'),
             (lambda: bars.inverse('QB').function(wrong), 'xp must be a package'),
             (lambda: bars.velocity(0.1, by=wrong), 'by must be the number of an input, from 0'),
-            (lambda: ankle.is_angle(wrong), 'allowed: O, S, O_origin.x'),
+            (lambda: RODS.is_angle(wrong), 'allowed: O, S, O_origin.x'),
             (lambda: LEVER.mechanisms['lever'].assembly().solution((), (wrong,)), 'joint'),
             (lambda: bars.driven_by(wrong), 'can be driven by 1 of none in a plane, not by'),
-            (lambda: ankle.driven_by(wrong), 'can be driven by 1 of O, S, not by')):
+            (lambda: RODS.driven_by(wrong), 'can be driven by 1 of O, S, not by')):
         with pytest.raises(ValueError, match=text):
-            ask()
+            call()
 
 
 def test_sides_of_rods_are_checked_whatever_drives():
-    lever = mechanisms.create('rods', joints=(
-        'O motor ground at 0 0 0 axis 0 0 1', 'S slide ground at 1 0 0 axis 1 0 0',
-        'R rod O 0 0.5 0 S 1.5 0 0.1'))
-    assert lever.driven_by('S', branches={'R': -1}).branches == {'R': -1}
+    assert RODS.driven_by('S', branches={'R': -1}).branches == {'R': -1}
     for wrong, text in (({'R': 5}, 'branch R must be'), ({'X': 1}, "has no branch 'X'"),
                         ('R', 'branches must be a mapping')):
         with pytest.raises(ValueError, match=text):
-            lever.driven_by('S', branches=wrong)
+            RODS.driven_by('S', branches=wrong)
 
 
 def test_pieces_of_the_first_of_several_inputs_are_for_others_that_are_given(arm):
     (low, *_), *_, (_, high, *_) = arm.monotone('P.x', [1.0])
+    # An angle turns by half a turn at most in each.
+    assert np.abs(np.diff(mechanisms.create('whitworth').monotone('lever'))[:, 2]).max() <= math.pi
     np.testing.assert_allclose([[low, high]], arm.reach(1.0))
     with pytest.raises(ValueError, match='the values of all except the first'):
         arm.monotone('P.x')
-
-
-def test_a_function_for_arrays_of_dimensions_is_refused(bars):
-    with pytest.raises(ValueError, match='one set of dimensions, not for arrays'):
-        bars.with_dimensions(a=[1.0, 1.1]).function('B')
 
 
 def test_there_are_as_many_numbers_as_inputs(bars, arm):
@@ -154,9 +149,9 @@ def test_there_are_as_many_numbers_as_inputs(bars, arm):
                 x), lambda x: two.over(*x))),
             (arm, 'near', (lambda x: two.nearest([0.1, 0.1], x), lambda x: two.path(
                 [[0.1], [0.1]], x), lambda x: two.follow([0.1, 0.1], x)))):
-        for ask in asks:
+        for call in asks:
             with pytest.raises(ValueError, match=f'{linkage.type} has . inputs?: {name} must be'):
-                ask([0.1, 0.2, 0.3])
+                call([0.1, 0.2, 0.3])
     for others in ((), (0.1, 0.2), [[0.1]], 0.1):
         with pytest.raises(ValueError, match='five_bar has 2 inputs: the values of all except'):
             arm.input_for('P.x', 0.1, others=others)
@@ -168,18 +163,18 @@ def test_there_are_as_many_numbers_as_inputs(bars, arm):
 
 
 def test_arrays_of_shapes_that_do_not_broadcast_are_refused_with_their_shapes(bars, arm):
-    for ask in (lambda: bars.servo_for('QB', [0.1, 0.2], [1.0, 1.0, 1.0]),
-                lambda: arm.inverse(('P.x', 'P.y')).over([0.1, 0.2], [0.1, 0.2, 0.3]),
-                lambda: arm.inverse(('P.x', 'P.y')).path([[0.1, 0.2], [0.1, 0.2, 0.3]])):
+    for call in (lambda: bars.servo_for('QB', [0.1, 0.2], [1.0, 1.0, 1.0]),
+                 lambda: arm.inverse(('P.x', 'P.y')).over([0.1, 0.2], [0.1, 0.2, 0.3]),
+                 lambda: arm.inverse(('P.x', 'P.y')).path([[0.1, 0.2], [0.1, 0.2, 0.3]])):
         with pytest.raises(ValueError, match=r'broadcast.*\(2,\).*\(3,\)'):
-            ask()
+            call()
 
 
 def test_a_path_starts_next_to_an_input_of_zero(bars):
     inverse = bars.inverse('P.x')
     value = bars.solve(0.0)['P'][0]
-    found, = inverse.path([np.array([value])], 0.0)[0]
-    assert found == pytest.approx([0.0], abs=1e-9)
+    crank, = inverse.path([np.array([value])], 0.0)[0]
+    assert crank == pytest.approx([0.0], abs=1e-9)
     for near in (math.nan, math.inf):
         with pytest.raises(ValueError, match='near must be finite'):
             inverse.path([np.array([value])], near)
@@ -202,6 +197,9 @@ def test_an_answer_prints_its_inputs_its_mode_and_its_margin(arm):
     assert repr(inverse) == '<inverse of five_bar for P.x, P.y>'
     assert isinstance(answer, Solution) and ' at 0x' not in str([answer])
     assert Answer is Solution  # as it was called
+    # A motor on a crank turns off to the left of that, then to the right.
+    assert [answer.mode for answer in CASES['elbow motor'].linkage().inputs_for(
+        ('B.x', 'B.y'), (0.4, 0.3))] == ['crank2+ det+', 'crank2- det-']
 
 
 # --- what they cost beside the inverse below them ---
@@ -229,9 +227,9 @@ def test_a_call_by_name_adds_a_few_calls_to_the_inverse_below_it(bars, near):
 def test_outputs_that_hardly_differ_are_answered_with_their_pose(arm, cranks):
     outputs = 'angle(O,P)', 'P.y'
     values = [float(value) for value in arm.joint_angles(cranks, outputs).values()]
-    found = arm.inverse(outputs).all(values)
-    assert any(np.allclose(answer.inputs, cranks, atol=1e-6) for answer in found)
-    for answer in found:
+    solutions = arm.inverse(outputs).all(values)
+    assert any(np.allclose(answer.inputs, cranks, atol=1e-6) for answer in solutions)
+    for answer in solutions:
         np.testing.assert_allclose([*arm.joint_angles(answer.inputs, outputs).values()], values,
                                    rtol=0.0, atol=1e-15)
 
@@ -242,24 +240,24 @@ def test_the_margin_of_a_pose_without_rates_is_zero():
     for output in ('distance(O,B)', 'B.y', 'AB'):
         inverse, value = stretched.inverse(output), float(stretched.joint_angles(
             0.0, (output,))[output])
-        found = inverse.all(value)
-        assert any(abs(answer.inputs[0]) < 1e-9 for answer in found)
+        solutions = inverse.all(value)
+        assert any(abs(answer.inputs[0]) < 1e-9 for answer in solutions)
         assert Solution((0.0,), inverse).margin == 0.0
-        assert all(0.0 <= answer.margin <= 1.0 and repr(answer) for answer in found)
+        assert all(0.0 <= answer.margin <= 1.0 and repr(answer) for answer in solutions)
 
 
 # --- what a linkage is created with ---
 
-@pytest.mark.parametrize('given, problem', [
+@pytest.mark.parametrize('arguments, problem', [
     ({'c': math.nan}, 'dimension c must be finite, got nan'),
     ({'c': 1e-31}, 'dimension c must lie between 1e-30 and 1e\\+30'),
     ({'b': 1e31}, 'dimension b must lie between'),
     ({'a': [1.0, 2.0], 'b': [1.0, 2.0, 3.0]}, r'shapes that broadcast, got a \(2,\), b \(3,\)'),
     ({'branches': {'B': True}}, 'branch B must be \\+1 or -1, got True'),
     ({'tracer': 'A'}, 'joints and tracer are for type custom or rods, not for slider_crank')])
-def test_wrong_dimensions_branches_and_tracers_are_named(given, problem):
+def test_wrong_dimensions_branches_and_tracers_are_named(arguments, problem):
     with pytest.raises(ValueError, match=problem):
-        mechanisms.create('slider_crank', **given)
+        mechanisms.create('slider_crank', **arguments)
 
 
 # --- names of any class of text ---
@@ -308,10 +306,10 @@ ASKED = {
 @pytest.mark.parametrize('made', [np.str_, member])
 @pytest.mark.parametrize('what', ASKED)
 def test_what_is_asked_by_names_of_any_class_is_the_same(made, what):
-    found, later = ASKED[what](made), ASKED[what](str)
-    assert found == later and len(found) > 0
+    first, later = ASKED[what](made), ASKED[what](str)
+    assert first == later and len(first) > 0
     # Nor are later callers given names of that class.
-    assert all(type(each) is str for each in (*found, *later) if isinstance(each, str))
+    assert all(type(each) is str for each in (*first, *later) if isinstance(each, str))
 
 
 # --- linkages of the user's own: two cranks, arrays of dimensions ---
@@ -329,16 +327,15 @@ def test_an_array_of_dimensions_is_broadcast_against_the_angle(shape, turned):
         pytest.skip('not broadcast')
     linkage = made(b=swept)
     place = linkage.solve(theta)
-    for found in (linkage.solve(theta, 'O')['O'][..., 0], linkage.effort(theta, {})[..., 0]):
-        assert found.shape == expected
+    for result in (linkage.solve(theta, 'O')['O'][..., 0], linkage.effort(theta, {})[..., 0]):
+        assert result.shape == expected
     assert place['B'].shape == (*expected, 2) and place['O'].shape == (*expected, 2)
     lengths, thetas = np.broadcast_arrays(swept, theta)
     for index in np.ndindex(expected):
-        one = made(b=float(lengths[index]))
-        np.testing.assert_allclose(place['B'][index], one.solve(float(thetas[index]))['B'],
-                                   rtol=1e-14)
+        single, crank = made(b=float(lengths[index])), float(thetas[index])
+        np.testing.assert_allclose(place['B'][index], single.solve(crank)['B'], rtol=1e-14)
         np.testing.assert_allclose(linkage.transmission_angles(theta)['B'][index],
-                                   one.transmission_angles(float(thetas[index]))['B'], rtol=1e-14)
+                                   single.transmission_angles(crank)['B'], rtol=1e-14)
 
 
 @pytest.mark.filterwarnings('error')
@@ -370,14 +367,15 @@ def test_a_linkage_stays_what_it_was_created_as():
             own['B'] = 1
 
 
-def test_questions_about_the_reach_are_for_one_set_of_dimensions():
+def test_questions_about_the_reach_and_functions_are_for_one_set_of_dimensions():
     linkage = made(b=np.array([3.0, 3.1]))
     boom = mechanisms.create('custom', r=[1.0, 1.1], joints=(
         'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O r right'))
-    for ask in (linkage.reach, linkage.dead_points, lambda: linkage.input_for('QB', 1.0),
-                boom.dead_points, lambda: boom.extremes('B.x', [(0.8, 0.9)])):
+    for call in (linkage.function, linkage.reach, linkage.dead_points,
+                 lambda: linkage.input_for('QB', 1.0), boom.dead_points,
+                 lambda: boom.extremes('B.x', [(0.8, 0.9)])):
         with pytest.raises(ValueError, match='for one set of dimensions, not for arrays'):
-            ask()
+            call()
 
 
 def test_arrays_of_dimensions_are_checked_too():

@@ -80,8 +80,8 @@ def test_outputs_of_several_mechanisms_in_one_message(stream, graph):
                 return float(four_bar.joint_angles(crank, [name])[name])
 
             # Of a name that comes twice the last counts, as in crank_states.
-            assert stream.want(['flap', 'somebody_else', name, 'flap'], [
-                    0.1, 9.0, output(crank), flap(servo)], [9.0, 9.0, 0.2, 0.3]) == {
+            assert stream.want(['old_lever_A.x', 'flap', name, 'flap'], [
+                    9.0, 0.1, output(crank), flap(servo)], [9.0, 9.0, 0.2, 0.3]) == {
                 'bar_crank': (pytest.approx(crank, abs=1e-12),
                               pytest.approx(0.2 / slope(output, crank), rel=1e-7)),
                 'servo': (pytest.approx(servo, abs=1e-13),
@@ -100,7 +100,9 @@ def test_the_first_command_is_next_to_where_the_crank_is(stream, graph):
         stream.want(['flap'], [flap(servo)])
     four_bar = mechanisms.create('four_bar')
     rocker = float(four_bar.joint_angles(-1.9)['QB'])
-    assert stream.want(['bar_QB'], [rocker])['bar_crank'] == (pytest.approx(-1.9, abs=1e-9),)
+    # Velocities without names are none.
+    assert stream.want(['bar_QB'], [rocker], [0.1, 0.2]) == {
+        'bar_crank': (pytest.approx(-1.9, abs=1e-9),)}
 
 
 def test_what_cannot_be_had_is_held_and_said(stream, capfd):
@@ -125,30 +127,31 @@ def test_two_outputs_of_one_input_or_motor_and_a_name_of_nobody_are_said(graph, 
     stream = Stream(graph, {**LEVER, 'bar.crank.source': 'servo'})
     assert stream.want(['flap', 'lever_A.x', 'bar_QB', 'boom'], [flap(0.7), 100.0, 1.2, 1.0]) == {
         'servo': (pytest.approx(0.7, abs=1e-13),)}
-    said = capfd.readouterr().err
+    log = capfd.readouterr().err
     for other in ('lever_A.x', 'bar_QB'):
-        assert f'flap and {other} are moved by one actuator, servo: name one of them' in said
-    assert 'no output is called boom' in said
+        assert f'flap and {other} are moved by one actuator, servo: name one of them' in log
+    assert 'no output is called boom' in log
 
 
-@pytest.mark.parametrize('given, output, named, sign', [
+@pytest.mark.parametrize('parameters, output, named, sign', [
     # The robot's name of a joint may be that of the linkage.
     ({'type': 'slotted_lever', 'joint_names': ['lever=lever']}, 'lever', 'lever', 1.0),
     ({'type': 'jansen', 'leg_pairs': 3}, 'BC', 'm_left0_BC', 1.0),
     ({'type': 'jansen', 'leg_pairs': 3, 'joint_names': ['left0_BC=-shin']}, 'BC', 'shin', -1.0)])
-def test_an_output_is_called_as_it_is_published(graph, given, output, named, sign):
+def test_an_output_is_called_as_it_is_published(graph, parameters, output, named, sign):
     stream = Stream(graph, {'mechanisms': ['m'], 'm.crank.start': 0.7,
-                            **{f'm.{key}': value for key, value in given.items()}})
-    angle = float(mechanisms.create(given['type']).joint_angles(0.7)[output])
+                            **{f'm.{key}': value for key, value in parameters.items()}})
+    angle = float(mechanisms.create(parameters['type']).joint_angles(0.7)[output])
     assert stream.want([named], [sign * angle]) == {'m_crank': (pytest.approx(0.7),)}
 
 
 def test_names_that_somebody_makes_up_do_not_fill_the_log(stream, capfd):
     for number in range(log.MAX_NAMES + 5):
         stream.want(['flap', f'wing{number}'], [flap(0.2), 1.0])
-    said = [line for line in capfd.readouterr().err.splitlines() if 'no output is called' in line]
-    assert 'called wing0;' in said[0] and len(said) == log.MAX_NAMES
-    assert 'no more will be named' in said[-1]
+    lines = capfd.readouterr().err.splitlines()
+    warnings = [line for line in lines if 'no output is called' in line]
+    assert 'called wing0;' in warnings[0] and len(warnings) == log.MAX_NAMES
+    assert 'no more will be named' in warnings[-1]
 
 
 def test_a_change_of_the_geometry_is_minded(stream, graph):
@@ -217,17 +220,19 @@ def test_a_foot_and_a_bucket_go_in_along_a_line_and_back_out(graph):
 
 
 def test_of_several_inputs_no_command_outlives_a_change_of_the_geometry(graph, capfd):
-    given = {
+    parameters = {
         'mechanisms': ['leg', 'other', 'bar'], 'leg.type': 'five_bar', 'leg.crank.start': 1.9,
         'leg.crank2.start': 1.24, 'other.type': 'five_bar', 'other.crank.start': 1.9,
         'other.crank2.start': 1.24, 'bar.type': 'four_bar'}
-    stream = Stream(graph, given)
+    stream = Stream(graph, parameters)
     names, far = [*FOOT, 'other_P.x', 'other_P.y', 'bar_QB'], [9.0, 9.0]
     good = stream.want(names, [*LINE[:2], *LINE[:2], 1.2])
     assert stream.want(names, [*far, *far, 1.2]) == good
-    graph.change(stream.node, given, leg__dimensions__a=0.085)
-    held = stream.want(names, [*far, *far, 1.2])
-    assert held == {name: at for name, at in good.items() if not name.startswith('leg')}
+    graph.change(stream.node, parameters, leg__dimensions__a=0.085)
+    commands = stream.want(names, [*far, *far, 1.2])
+    assert commands == {name: at for name, at in good.items() if not name.startswith('leg')}
+    graph.change(stream.node, parameters, other__scale=1.1)
+    assert stream.want(names, [*far, *far, 1.2]).keys() == {'bar_crank'}
     assert stream.want([FOOT[0], 'bar_QB'], [9.0, 1.2]).keys() == {'bar_crank'}
     assert f'leg has 2 inputs: name 2 of its outputs, not {FOOT[0]}' in capfd.readouterr().err
 
@@ -289,10 +294,10 @@ def test_a_trajectory_becomes_that_of_the_actuators(graph, plan):
     def rocker(crank):
         return float(four_bar.joint_angles(crank)['QB'])
 
-    found = graph.until(plan(['bar_QB', 'flap'], *(
+    trajectory = graph.until(plan(['bar_QB', 'flap'], *(
         ([rocker(crank), flap(servo)], [0.2, -0.1]) for crank, servo in zip(cranks, servos))))[0]
-    assert found.joint_names == ['bar_crank', 'servo']
-    for second, (point, crank, servo) in enumerate(zip(found.points, cranks, servos)):
+    assert trajectory.joint_names == ['bar_crank', 'servo']
+    for second, (point, crank, servo) in enumerate(zip(trajectory.points, cranks, servos)):
         assert point.time_from_start.sec == second
         assert point.positions.tolist() == pytest.approx([crank, servo], abs=1e-12)
         assert point.velocities.tolist() == pytest.approx(
@@ -326,8 +331,8 @@ def test_a_trajectory_that_cannot_be_is_refused_as_a_whole(graph, plan, capfd):
     for names, points, _ in REFUSED:
         refused.append(plan(names, *points))
         graph.until(lambda: len(reasons()) == len(refused))
-    for found, (_, _, reason) in zip(reasons(), REFUSED):
-        assert re.fullmatch(reason, found), (found, reason)
+    for text, (_, _, reason) in zip(reasons(), REFUSED):
+        assert re.fullmatch(reason, text), (text, reason)
     times = [(0, 5), (0, 5), (1, 0), (0, 2 * 10 ** 9)]
     good, = graph.until(plan(['flap'], *(([flap(0.3)], [], time) for time in times)))
     assert [point.positions.tolist() for point in good.points] == [
@@ -336,11 +341,17 @@ def test_a_trajectory_that_cannot_be_is_refused_as_a_whole(graph, plan, capfd):
         Duration(sec=sec, nanosec=nanosec) for sec, nanosec in times]
     assert not any(point.velocities for point in good.points)
     assert not any(one() for one in refused)
+    # Where an output turns back it may stand still.
+    extreme, = graph.until(plan(['bar_A.x'], ([40.0], [0.0])))
+    assert extreme.points[0].velocities.tolist() == [0.0]
 
 
 @pytest.mark.parametrize('stream', [SEVERAL], indirect=True)
-def test_a_newer_trajectory_ends_the_older_one(graph, plan):
+def test_a_newer_trajectory_ends_the_older_one_and_no_later_point_jumps(graph, plan, capfd):
     # Alone, the older one takes seconds, however late the newer one comes.
     older = plan(FOOT + BUCKET, *[(LINE.tolist(), [])] * 10_000)
     newer = plan(FOOT, (LINE[:2].tolist(), []))
     assert graph.until(newer) and not older()
+    # Only another assembly mode comes to this side of the ground bar.
+    plan(FOOT, (LINE[:2].tolist(), []), ([0.01, 0.04], []))
+    graph.until(lambda: 'the way to P.x, P.y at 0.01, 0.04 leads' in capfd.readouterr().err)

@@ -37,9 +37,9 @@ CLOSE = {'double': 1e-12, 'float': 1e-6}
 POSES, NEAR, SLACK = 300, {'double': 1e-9, 'float': 1e-6}, {'double': 1e-6, 'float': 1e-2}
 
 
-def read(name, joint_lines, names=(), **given):
+def read(name, joint_lines, names=(), **parameters):
     """Return a mechanism of joint lines, with the names of its commanded joints."""
-    return header.Request(alone(joint_lines, name, **given), (), tuple(names))
+    return header.Request(alone(joint_lines, name, **parameters), (), tuple(names))
 
 
 def drawn(seeds):
@@ -47,12 +47,12 @@ def drawn(seeds):
     for seed in seeds:
         rng = np.random.default_rng(seed)
         design = random_linkages.design(rng)
-        given = {f'dimensions.{key}': float(value) for key, value in design.dimensions.items()}
+        lengths = {f'dimensions.{key}': float(value) for key, value in design.dimensions.items()}
         names = [()]
         for i in range(3):
             name = f'm{seed}_{i}'
             with suppress(scene.SceneError, ValueError):  # no pose, or not these outputs
-                case = read(name, design.joints, names[i] if i < len(names) else (), **given)
+                case = read(name, design.joints, names[i] if i < len(names) else (), **lengths)
                 header.printed([case])
                 yield case
                 if not i:

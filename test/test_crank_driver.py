@@ -44,8 +44,8 @@ class Driver:
             return [m for m in self._heard if m.header.stamp.sec * SECOND
                     + m.header.stamp.nanosec == now]
 
-        found = self._graph.until(message)[0]
-        return found.position[0], found.velocity[0]
+        state = self._graph.until(message)[0]
+        return state.position[0], state.velocity[0]
 
     def back_to(self, now):
         """Set the time back and let the node notice."""
@@ -66,18 +66,14 @@ MOTIONS = {
     'start plus speed times time, a turn taken off': (
         {**DROP, 'drop.crank.speed': 2.0, 'drop.crank.start': 0.5},
         (5, (0.5, 2.0)), (6, (2.5, 2.0)), (9, (approx(8.5 - math.tau, abs=1e-15), 2.0))),
-    'a motor has a ratio and an offset': (
-        {**DROP, 'drop.crank.ratio': -0.25, 'drop.crank.offset': 1.0}, (1, (4.0, -4.0)),
-        (3, (-4.0, -4.0))),
-    'a sweep is a triangle wave': (
-        {**DROP, 'drop.crank.sweep': [-0.5, 1.0], 'drop.crank.speed': -1.0}, (1, (0.0, -1.0)),
-        (1.25, (-0.25, -1.0)), (1.75, (-0.25, 1.0)), (3.25, (0.75, -1.0))),
-    'a change of speed makes no jump': (
-        DROP, (1, (0.0, 1.0)), (3, (2.0, 1.0)), {'drop__crank__speed': -0.5}, (4, (1.5, -0.5)),
-        (5, (1.0, -0.5))),
-    'a new start puts the crank there': (
-        {**DROP, 'drop.crank.speed': 0.0}, (1, (0.0, 0.0)), {'drop__crank__start': 1.25},
-        (2, (1.25, 0.0))),
+    'a motor has a ratio and an offset, and a sweep is a triangle wave': (
+        {**DROP, 'drop.crank.ratio': -0.25, 'drop.crank.offset': 1.0, 'drop.crank.speed': -1.0,
+         'drop.crank.sweep': [-0.5, 1.0]}, (1, (4.0, 4.0)), (1.25, (5.0, 4.0)),
+        (1.75, (5.0, -4.0)), (3.25, (1.0, 4.0))),
+    'a joint that moves two inputs does what the last of them says': (
+        {**DROP, 'mechanisms': ['drop', 'bars'], 'bars.type': 'four_bar',
+         'bars.crank.source': 'drop_crank', 'bars.crank.speed': -0.5, 'bars.crank.start': 2.0},
+        (1, (2.0, -0.5)), (2, (1.5, -0.5))),
     'an end of a range may be rounded': (
         DROP, {'drop__crank__speed': 100.00001}, (1, (0.0, 100.00001))),
     'simulated time may leap ahead': (
@@ -151,24 +147,24 @@ class OnSystemTime(CrankDriver):
 def on_system_time(graph):
     """Return a crank driver whose clock can be set, and what it sends; it has sent something."""
     node = graph.start(OnSystemTime, {'mechanisms': ['drop'], 'drop.type': 'water_drop'})
-    heard = graph.listen(JointState, 'crank_states')
-    graph.until(lambda: len(heard) > 2)
-    return node, heard
+    messages = graph.listen(JointState, 'crank_states')
+    graph.until(lambda: len(messages) > 2)
+    return node, messages
 
 
 @pytest.mark.parametrize('seconds, speed', [(3600, 1.0), (-1000, 1.0), (1000, 0.5)])
 def test_system_time_that_is_set_makes_no_jump_not_even_amid_a_change(
         graph, on_system_time, seconds, speed):
-    node, heard = on_system_time
-    before = heard[-1].position[0]
+    node, messages = on_system_time
+    before = messages[-1].position[0]
     node.set_by = Duration(seconds=seconds)
     if speed != 1.0:
         assert node.set_parameters([Parameter('drop.crank.speed', value=speed)])[0].successful
-    del heard[:]
+    del messages[:]
     now = node.system_time()
-    graph.until(lambda: [m for m in heard if abs(
+    graph.until(lambda: [m for m in messages if abs(
         m.header.stamp.sec * SECOND + m.header.stamp.nanosec - now) < 100 * SECOND][2:])
-    for message in heard:
+    for message in messages:
         assert 0.0 <= (message.position[0] - before) % math.tau < 2.0
     assert message.velocity[0] == speed
 

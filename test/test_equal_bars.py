@@ -29,8 +29,8 @@ def folded(word, size):
 
 def hold(design):
     """Hold a linkage, if it is one, next to the special values of its first input."""
-    found = linkage_checks.problems(design, np.random.default_rng(0), [equal_bars.limited])
-    assert not found or not found[0], found[0][0]
+    problems = linkage_checks.problems(design, np.random.default_rng(0), [equal_bars.limited])
+    assert not problems or not problems[0], problems[0][0]
 
 
 @pytest.mark.nightly(all_but=4)
@@ -62,9 +62,9 @@ def test_the_catalogue_with_pairwise_equal_bars_has_limits_and_nothing_infinite(
     # The joint of a dyad on a carriage that comes to the ground joint changes sides.
     (('Q ground 1 0', 'S carriage O along Q -1 1', 'C dyad O S 2 2 left'), 0.0)])
 def test_a_joint_that_would_jump_has_no_place_there(lines, where):
-    found = mechanisms.create('custom', joints=['O ground 0 0', *lines])
+    linkage = mechanisms.create('custom', joints=['O ground 0 0', *lines])
     for theta in (where, where + 5e-324, where - 1e-200):
-        assert np.isnan(found.solve(theta, found.points[-1:])[found.points[-1]]).all()
-        assert np.isnan(found.solve(np.array([theta]))[found.points[-1]]).all()
-    sides = [found.solve(where + step)[found.points[-1]] for step in (1e-12, -1e-12)]
+        assert np.isnan(linkage.solve(theta, linkage.points[-1:])[linkage.points[-1]]).all()
+        assert np.isnan(linkage.solve(np.array([theta]))[linkage.points[-1]]).all()
+    sides = [linkage.solve(where + step)[linkage.points[-1]] for step in (1e-12, -1e-12)]
     assert np.linalg.norm(np.subtract(*sides)) > 1.9

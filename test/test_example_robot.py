@@ -88,9 +88,9 @@ def test_every_joint_is_told_and_stays_within_the_limits_of_the_urdf(told):
               for name, joint in JOINTS.items() if (limit := joint.find('limit')) is not None}
     assert len(limits) == 7
     for name, (low, high) in limits.items():
-        seen = [state[name] for state in told if name in state]
-        assert low < min(seen) < max(seen) < high
-        assert np.ptp(seen) > 0.4 * (high - low)
+        positions = [state[name] for state in told if name in state]
+        assert low < min(positions) < max(positions) < high
+        assert np.ptp(positions) > 0.4 * (high - low)
 
 
 def test_gears_have_their_ratios_and_a_partial_message_moves_its_motor_alone(told):
@@ -112,9 +112,9 @@ def test_markers_stay_on_the_link_that_the_loop_stands_on_wherever_it_is(
         robot.turn(('abduction_motor', 'hip_motor'), [at, at])
         robot.turn(('knee_motor',), [at])
         *_, pin = (spheres := graph.crank([motor], 'joint_states')([at], drawn).markers[1]).points
-        wanted, = urdf.places(robot.joints, [f'{name}_pin'], base).values()
+        expected, = urdf.places(robot.joints, [f'{name}_pin'], base).values()
         assert spheres.header.frame_id == base
-        assert in_frame(spheres.pose, pin) == pytest.approx(wanted, abs=1e-12)
+        assert in_frame(spheres.pose, pin) == pytest.approx(expected, abs=1e-12)
 
 
 def test_a_simulated_motor_says_what_the_real_one_would(graph):
@@ -137,12 +137,12 @@ def test_the_picture_is_drawn_by_its_command(tmp_path):
 def test_the_example_s_rods_are_closed_in_its_own_urdf(graph):
     graph.start(Kinematics, cli_args=['--ros-args', '--params-file', str(EXAMPLES / 'ankle.yaml')])
     turn = graph.crank(['motor_right', 'motor_left'])
-    heard = graph.listen(JointState, 'ankle/joint_states')
+    messages = graph.listen(JointState, 'ankle/joint_states')
     robot = Pinocchio((EXAMPLES / 'ankle.urdf').read_text())
     lengths = {'right': math.dist((0.0395, -0.0164, 0.2112), (0.022, -0.015, -0.0096)),
                'left': math.dist((0.035, 0.0165, 0.1469), (0.022, 0.015, -0.0096))}
     for motors in np.random.default_rng(1).uniform(-0.2, 0.2, (20, 2)).tolist():
-        message = turn(motors, heard)
+        message = turn(motors, messages)
         joints = {'motor_right': motors[0], 'motor_left': motors[1],
                   **dict(zip(message.name, message.position))}
         assert joints.keys() == {*robot.joints}

@@ -188,8 +188,8 @@ def test_all_that_is_printed_of_a_robot():
 def test_bars_that_mirror_others_have_a_word_of_their_own(word, base):
     linkage = mechanisms.create('custom', joints=[
         'A ground 0 0', f'B ground {base}', 'C crank A 0.2', f'D {word} A C B'])
-    given, reports, still = cli.described(robot_of(linkage, 0.7))
-    ground, _, crank, line, *_ = given['crank.joints']
+    parameters, reports, still = cli.described(robot_of(linkage, 0.7))
+    ground, _, crank, line, *_ = parameters['crank.joints']
     assert (ground, crank, line) == ('A ground 0 0', 'C crank A 0.2', f'D {word} A C B')
     assert [line[:9] for line in reports] == ['Checked: '] and not still
 
@@ -247,9 +247,9 @@ def test_joints_that_no_mechanism_publishes_are_one_of_cranks_where_they_are(tmp
         <mimic joint="j" multiplier="-0.5" offset="0.1"/></joint>
       <joint name="l" type="revolute"><parent link="c"/><child link="d"/></joint>
       <joint name="rail" type="prismatic"><parent link="d"/><child link="e"/></joint></robot>""")))
-    given, lost = cli.others(with_positions(robot, {'rail': -15.0, 'j': 200.0}), {}, {
+    parameters, lost = cli.others(with_positions(robot, {'rail': -15.0, 'j': 200.0}), {}, {
         'l': 0.25, 'nobody': 1.0})
-    assert not lost and given == {
+    assert not lost and parameters == {
         'mechanisms': ['others'], 'others.type': 'custom', 'others.only_named': True,
         'others.joints': ['A ground 0 0', *(f'B{i} crank A 1' for i in (1, 2, 3, 4))],
         'others.joint_names': ['crank2="k 2"-99.9'], **{
@@ -424,11 +424,11 @@ def undecided(seed):
 def test_a_line_that_is_pasted_leads_on(seeds):
     pasted = 0
     for robot in filter(None, map(undecided, seeds)):
-        lines, said = [], [answer(robot)]
-        while offered := choices('\n'.join([*said[-1], ''])):
+        lines, reports = [], [answer(robot)]
+        while offered := choices('\n'.join([*reports[-1], ''])):
             lines.append(offered[-1])
-            said.append(answer(robot, *lines))
-            assert said[-1] not in said[:-1], said
+            reports.append(answer(robot, *lines))
+            assert reports[-1] not in reports[:-1], reports
             pasted += 1
     # Some robots are decided at once, and some refused for good.
     assert pasted >= max(1, len(seeds) // 10)
@@ -462,9 +462,9 @@ def test_the_table_of_messages_has_all_refusals_and_no_others():
     package = Path(cli.__file__).parents[1]
     trees = [ast.parse(path.read_text()) for path in (
         *package.glob('robot_*/*.py'), package / 'linkage' / 'dyads.py')]
-    said = [each for tree in trees for each in refusals(tree)]
-    assert len(said) > 45
-    assert not [each for each in said if not any(quote in each for quote in quotes)]
+    reports = [each for tree in trees for each in refusals(tree)]
+    assert len(reports) > 45
+    assert not [each for each in reports if not any(quote in each for quote in quotes)]
     assert not [quote for quote in quotes if not any(quote in quoted(tree) for tree in trees)]
 
 
@@ -489,14 +489,14 @@ def test_a_cylinder_in_space_turns_a_foot(tmp_path, ends, ref, limits, ram, sign
     assert code == 0 and 'in 240 poses of the robot, ram from ' in err and 'Left out' not in err
     assert f'- pitch hinge ground at 0 0 0.1 axis 0 1 0{limits} - ram' in ' '.join(out.split())
     mechanism, = imported(file)
-    drive, = mechanism.inputs.values()
-    assert (mechanism.name, drive.source, mechanism.frame_id) == ('ram_rods', 'ram', 'shin')
+    settings, = mechanism.inputs.values()
+    assert (mechanism.name, settings.source, mechanism.frame_id) == ('ram_rods', 'ram', 'shin')
     pivot, base, eye = np.array([[0.0, 0.0, 0.1], [-0.6, 0.3, -0.8], [-0.5, -0.1, 0.2]])
     start = np.linalg.norm(pivot + eye - base)
-    assert drive.start == pytest.approx(start)
+    assert settings.start == pytest.approx(start)
     if ram:
         low, high = sorted(start + sign * (end - 0.3) for end in (0.1, 0.45))
-        assert low <= drive.ends[0] < drive.ends[1] == pytest.approx(high)
+        assert low <= settings.ends[0] < settings.ends[1] == pytest.approx(high)
     for angle in np.linspace(-0.39, 0.49, 9):
         length = np.linalg.norm(pivot + rotation((0.0, angle, 0.0)) @ eye - base)
         ram = 0.3 + sign * (length - start)

@@ -21,9 +21,9 @@ PAIR = {'mechanisms': ['m3', 'm4'], 'm3.type': 'four_bar', 'm4.type': 'slider_cr
 
 def jansens(a):
     """Return jansens with a dimension, of three sizes."""
-    given = {f'{name}.{key}': value for i, name in enumerate('xyz') for key, value in (
+    parameters = {f'{name}.{key}': value for i, name in enumerate('xyz') for key, value in (
         ('type', 'jansen'), ('scale', 1.0 + i), ('dimensions.a', a))}
-    shown = scene.read({'mechanisms': [*'xyz'], **given})
+    shown = scene.read({'mechanisms': [*'xyz'], **parameters})
     return [*shown.mechanisms.values()]
 
 

@@ -243,8 +243,8 @@ def test_ros2_control_moves_the_motors_of_the_scene(graph, reader):
     commands, answers = graph.listen(Float64MultiArray, 'knee/commands'), []
     graph.node.create_subscription(
         JointState, 'joint_states', lambda m: 'knee' in m.name and answers.append(m), 10)
-    wanted = graph.node.create_publisher(JointState, 'wanted_states', 10)
-    graph.until(lambda: commands or wanted.publish(JointState(name=['knee'], position=[0.9])))
+    publisher = graph.node.create_publisher(JointState, 'wanted_states', 10)
+    graph.until(lambda: commands or publisher.publish(JointState(name=['knee'], position=[0.9])))
     state = graph.crank(['knee_motor'], 'joint_states')(commands[0].data, answers)
     assert state.position[state.name.index('knee')] == pytest.approx(0.9, abs=1e-12)
 

@@ -30,8 +30,8 @@ def test_every_answer_is_right_to_the_last_digits(kind, values):
     linkage, rng = mechanisms.create(kind), np.random.default_rng(1)
     measure, count = strict(linkage), 0
     for output in linkage_checks.moved(linkage):
-        wanted = linkage.joint_angles(inside(linkage, rng, values), (output,))[output]
-        for value, answers in [*zip(wanted.tolist(), linkage.input_for(output, wanted))][:6]:
+        expected = linkage.joint_angles(inside(linkage, rng, values), (output,))[output]
+        for value, answers in [*zip(expected.tolist(), linkage.input_for(output, expected))][:6]:
             answers = answers[np.isfinite(answers)]
             assert (np.diff(answers) > 0.0).all() and (np.abs(answers) <= math.pi).all()
             for theta in answers.tolist():
@@ -48,11 +48,11 @@ def _miss(measure, theta, output, value):
     truth = measure.at([theta])
     i, out = next((i, out) for i, out in enumerate(measure.poses)
                   if out.name == (name or output) and (out.what == 'point') == bool(name))
-    found = truth.values[i]
+    exact = truth.values[i]
     if out.what == 'angle':
-        error = DIGITS.direction(found * DIGITS.turned(-gmpy2.mpfr(value)))
+        error = DIGITS.direction(exact * DIGITS.turned(-gmpy2.mpfr(value)))
     else:
-        error = (getattr(found, {'x': 'real', 'y': 'imag'}[axis]) if name else found) - value
+        error = (getattr(exact, {'x': 'real', 'y': 'imag'}[axis]) if name else exact) - value
     return abs(float(error)), truth.sensitivity[i] + 0.5 * np.spacing(abs(value))
 
 
@@ -105,9 +105,9 @@ def test_a_slot_through_the_pivot_always_passes_on_the_whole_force():
 def test_every_joint_that_closes_a_loop_has_a_transmission_angle_between_its_bars(kind):
     linkage = mechanisms.create(kind)
     theta = inside(linkage, np.random.default_rng(6), 9)
-    place, found = linkage.solve(theta), linkage.transmission_angles(theta)
-    assert found
-    for joint, angle in found.items():
+    place, angles = linkage.solve(theta), linkage.transmission_angles(theta)
+    assert angles
+    for joint, angle in angles.items():
         assert ((angle >= 0) & (angle <= math.pi)).all()
         line = next(line for line in mechanisms.design(kind).lines if joint in line.names)
         if line.word in ('dyad', 'mirror', 'parallelogram'):
@@ -134,7 +134,7 @@ UPRIGHT = math.asin(30.0 / 40.0)
     ('pantograph', {'a': 1.0, 'b': 2.0, 'c': 2.0, 'g': 3.0}, [-2.0 * math.pi, 0.0])])
 def test_dead_points_are_where_a_dyad_stretches_or_folds(kind, numbers, expected):
     linkage = mechanisms.create(kind, **numbers)
-    found = linkage.dead_points()
-    assert found == pytest.approx(expected, rel=1e-14, abs=1e-8 if kind == 'pantograph' else 1e-15)
-    if kind == 'four_bar' and found:
-        assert linkage.transmission_angles(found[1])['B'] == pytest.approx(0.0, abs=1e-7)
+    dead = linkage.dead_points()
+    assert dead == pytest.approx(expected, rel=1e-14, abs=1e-8 if kind == 'pantograph' else 1e-15)
+    if kind == 'four_bar' and dead:
+        assert linkage.transmission_angles(dead[1])['B'] == pytest.approx(0.0, abs=1e-7)

@@ -49,9 +49,9 @@ def test_joint_angles_and_slides_come_apart(kind, outputs):
 @pytest.mark.parametrize('by', [-1, 2, 'crank2', 1.0, None, True])
 def test_an_input_that_there_is_not_is_refused(by):
     linkage = mechanisms.create('five_bar')
-    for ask in (linkage.velocity, linkage.joint_rates):
+    for call in (linkage.velocity, linkage.joint_rates):
         with pytest.raises(ValueError, match='by must be the number of an input, from 0 to 1'):
-            ask((1.0, 2.0), None, by)
+            call((1.0, 2.0), None, by)
 
 
 def test_an_output_that_only_rounding_moves_has_no_answers():
@@ -79,8 +79,8 @@ def test_no_values_have_no_answers(shape):
         inputs, rates = inverse.over(*[none] * len(outputs))
         assert inputs.shape == (len(outputs), *shape, 1)
         assert rates.shape == (len(outputs) ** 2, *shape, 1)
-        found, _ = inverse.path([none.ravel()] * len(outputs))
-        assert found[0].shape == (0,)
+        path, _ = inverse.path([none.ravel()] * len(outputs))
+        assert path[0].shape == (0,)
 
 
 def test_the_rate_is_that_of_the_linkage_where_another_mode_passes():
@@ -166,9 +166,9 @@ def test_a_path_is_the_nearest_of_one_value_after_the_other(kind, outputs, limit
     values[:, rng.random(120) < 0.1] += 3.0 * linkage.longest
     ends = [(-2.0, 9.0)] * n if limited else None
     seed = inputs[:, 0]
-    found, _ = inverse.path(list(values), near=seed, ends=ends)
+    path, _ = inverse.path(list(values), near=seed, ends=ends)
     reached = 0
-    for value, place in zip(values.T, np.transpose(found)):
+    for value, place in zip(values.T, np.transpose(path)):
         expected, _ = inverse.nearest(value.tolist(), near=seed.tolist(), ends=ends)
         np.testing.assert_allclose(place, expected, rtol=0.0, atol=1e-9)
         if np.isfinite(expected).all():

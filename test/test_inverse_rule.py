@@ -94,9 +94,9 @@ def test_special_linkages_have_each_pose_and_no_other(special):
                 assert linkage.input_for(output, value, at) == pytest.approx(at, abs=1e-6)
 
 
-def counts(found, *kinds):
+def counts(counter, *kinds):
     """Return what is wrong at some kinds of values."""
-    return {key: number for key, number in found.items()
+    return {key: number for key, number in counter.items()
             if key[1] not in ('questions', 'duplicates') and key[0] in kinds}
 
 
@@ -106,8 +106,8 @@ def test_of_the_catalogue_nothing_is_lost_or_invented(kind):
     linkage, rng = mechanisms.create(kind), np.random.default_rng(5)
     names = linkage_checks.moved(linkage)
     for name in (*names[:2], *map(str, rng.choice(names, 2))):
-        found, worst = inverse_judge.judge(linkage, name, rng)
-        assert found and not counts(found, *inverse_judge.KINDS), (name, found)
+        counter, worst = inverse_judge.judge(linkage, name, rng)
+        assert counter and not counts(counter, *inverse_judge.KINDS), (name, counter)
         assert worst <= inverse_judge.MOST
 
 
@@ -115,16 +115,16 @@ def test_of_the_catalogue_nothing_is_lost_or_invented(kind):
 @pytest.mark.parametrize('outputs', [
     ('P.x', 'P.y'), ('P.x', 'crank'), ('crank2', 'P.y'), ('angle(P,Q)', 'crank')])
 def test_of_two_inputs_no_ordinary_solution_is_lost_or_invented(outputs):
-    found, _ = inverse_judge.judge_several(
+    counter, _ = inverse_judge.judge_several(
         mechanisms.create('five_bar'), outputs, np.random.default_rng(1), 60)
-    assert found['ordinary', 'questions'] > 15 and not counts(found, 'ordinary')
+    assert counter['ordinary', 'questions'] > 15 and not counts(counter, 'ordinary')
 
 
 def test_with_the_other_inputs_held_a_search_loses_nothing_next_to_an_extreme():
     (_, linkage, rng), = linkage_checks.assembled([7])
     assert not linkage.inverse(('K.x', 'drive', 'crank')).closed
-    found, _ = inverse_judge.judge(linkage, 'K.x', rng, others=(2.7, -2.8))
-    assert found['next to ends', 'questions'] and not counts(found, 'ordinary', 'next to ends')
+    counter, _ = inverse_judge.judge(linkage, 'K.x', rng, others=(2.7, -2.8))
+    assert counter['next to ends', 'questions'] and not counts(counter, 'ordinary', 'next to ends')
 
 
 def test_another_assembly_mode_leads_to_no_solution():
@@ -133,21 +133,21 @@ def test_another_assembly_mode_leads_to_no_solution():
         'D dyad C B 2.19 2.189999999999781 right', 'E cylinder A D 2.19 right'])
     for theta in np.linspace(2.8, 3.1, 20).tolist():
         value = float(linkage.joint_angles((theta, 3.0), ['D.x'])['D.x'])
-        found = [solution.inputs[0] for solution in linkage.inverse(
+        cranks = [solution.inputs[0] for solution in linkage.inverse(
             ('D.x', 'cylinder')).all((value, 3.0))]
-        assert found == pytest.approx([-theta, theta], abs=1e-12)
+        assert cranks == pytest.approx([-theta, theta], abs=1e-12)
 
 
 def test_rates_where_a_pose_has_none_are_those_of_the_nearest_float_that_has_them():
-    found = mechanisms.create('custom', joints=[
+    linkage = mechanisms.create('custom', joints=[
         'A ground 0 0', 'B ground 2.1 -0.0714483557885009', 'C crank A 1.100977588441',
         'D slider C 2.3782075834 A along B out', 'E dyad D A 1.5 0.5971384475097938 right',
         'G slider D 0.4768848 C along A in'])
-    start, _ = found.reach()[0]
-    (theta,), (rate,) = found.inverse('DG').nearest(
-        (float(found.joint_angles(start, ['DG'])['DG']),), (start,))
+    start, _ = linkage.reach()[0]
+    (theta,), (rate,) = linkage.inverse('DG').nearest(
+        (float(linkage.joint_angles(start, ['DG'])['DG']),), (start,))
     inside = theta + math.ulp(theta) * np.arange(9)
-    rates = found.joint_rates(inside, ['DG'])['DG']
+    rates = linkage.joint_rates(inside, ['DG'])['DG']
     assert not math.isfinite(rates[0]) and theta == pytest.approx(start, abs=1e-14)
     assert rate == pytest.approx(rates[np.isfinite(rates)][0])
 
@@ -171,14 +171,15 @@ def test_the_end_of_a_long_period_has_a_pose_a_period_away_too(ratio):
                 -first.turn, first.turn)), (end, answer)
 
 
-@pytest.mark.parametrize('away, answers', [(-1e-3, 2), (-1e-9, 2), (-1e-14, 1), (1e-10, 1),
-                                           (1e-8, 0), (1e-3, 0)])
-def test_next_to_an_extreme_values_have_two_solutions_or_its_own_or_none(away, answers):
-    crank = mechanisms.create('slider_crank', a=40.0, b=120.0, c=0.0)
-    found = crank.inverse('block').all(160.0 + away * crank.longest)
-    assert len(found) == answers
-    if answers == 1:
-        assert found[0].inputs == (0.0,)
+@pytest.mark.parametrize('distance, answers', [(-1e-3, 2), (-1e-9, 2), (-1e-14, 1), (1e-10, 1),
+                                               (1e-8, 0), (1e-3, 0)])
+def test_next_to_an_extreme_values_have_two_solutions_or_its_own_or_none(distance, answers):
+    engine = mechanisms.create('slider_crank', a=40.0, b=120.0, c=0.0)
+    crank = mechanisms.create('custom', joints=['O ground -1 0', 'A crank O 1'])
+    for linkage, output, extreme in (engine, 'block', 160.0), (crank, 'A.x', 0.0):
+        solutions = linkage.inverse(output).all(extreme + distance * linkage.longest)
+        assert len(solutions) == answers
+        assert answers != 1 or solutions[0].inputs == (0.0,)
 
 
 def test_the_jacobian_has_a_row_for_each_output():

@@ -187,8 +187,8 @@ def test_arithmetic_is_what_python_makes_of_the_same_letters(count):
             with pytest.raises(ValueError, match='joint line "P ground'):
                 made(f'P ground {number} 0')
             continue
-        found = made(f'P ground {number} 0').solve(0.0, ('P',))['P'][0]
-        assert found == pytest.approx(value, rel=1e-13, abs=1e-13), number
+        place = made(f'P ground {number} 0').solve(0.0, ('P',))['P'][0]
+        assert place == pytest.approx(value, rel=1e-13, abs=1e-13), number
         tried += 1
     assert 0.5 * count < tried < count
 

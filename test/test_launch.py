@@ -57,7 +57,7 @@ def topics(config):
 def test_rviz_and_foxglove_show_what_the_nodes_of_the_scene_publish(graph, shown):
     from linkage_ros.nodes.kinematics import Kinematics
 
-    given = scene.load(str(CONFIG / 'all.yaml'))
+    catalogue = scene.load(str(CONFIG / 'all.yaml'))
     node = graph.start(Kinematics, example('all'))
     published = set()
     for name, types in node.get_publisher_names_and_types_by_node('kinematics', '/'):
@@ -65,24 +65,24 @@ def test_rviz_and_foxglove_show_what_the_nodes_of_the_scene_publish(graph, shown
             if type_ in types and name != '/robot_description':
                 info, = node.get_publishers_info_by_topic(name)
                 published.add((name, class_, DURABLE[info.qos_profile.durability.name]))
-    assert len(published) == 3 * len(given.mechanisms)
+    assert len(published) == 3 * len(catalogue.mechanisms)
     assert topics(shown) == published
     layout = json.loads((CONFIG / 'linkage.foxglove.json').read_text())
     panels, room = layout['configById'], layout['layout']
     assert set(panels) == {room['first'], room['second']['first'], room['second']['second']}
     drawn = panels['3D!linkages']
-    assert drawn['followTf'] == given.frame_id and set(drawn['topics']) == {
+    assert drawn['followTf'] == catalogue.frame_id and set(drawn['topics']) == {
         name for name, *_ in published if not name.endswith('/robot_description')}
     for path in panels['Plot!joints']['paths']:
-        found = re.fullmatch(r'/(\w+)/joint_states\.position\[(\d)\]', path['value'])
-        name, place = found.groups()
-        called = [joint.name for joint in given.mechanisms[name].joints.values()]
+        match = re.fullmatch(r'/(\w+)/joint_states\.position\[(\d)\]', path['value'])
+        name, place = match.groups()
+        called = [joint.name for joint in catalogue.mechanisms[name].joints.values()]
         assert path['label'] == called[int(place)]
 
 
 def test_rviz_shows_any_other_scene_too(shown):
-    given = scene.load(str(CONFIG / 'all.yaml'))
-    assert rviz.adapted(shown, given.mechanisms, given.frame_id) == shown
+    scene_ = scene.load(str(CONFIG / 'all.yaml'))
+    assert rviz.adapted(shown, scene_.mechanisms, scene_.frame_id) == shown
     mechanisms = scene.read(
         {'mechanisms': ['walker', 'jansen'], 'walker.type': 'klann'}).mechanisms
     other = rviz.adapted(shown, mechanisms, 'earth', 'left/side', True, 'left/')
@@ -92,7 +92,7 @@ def test_rviz_shows_any_other_scene_too(shown):
     assert other['Visualization Manager']['Global Options']['Fixed Frame'] == 'earth'
     assert all(d['Enabled'] and d['Value'] for d in displays(other))
     assert [d['TF Prefix'] for d in displays(other) if 'TF Prefix' in d] == ['left', 'left']
-    assert rviz.adapted(other, given.mechanisms, given.frame_id)['Panels'] == shown['Panels']
+    assert rviz.adapted(other, scene_.mechanisms, scene_.frame_id)['Panels'] == shown['Panels']
 
 
 def test_rviz_opens_on_all_of_a_linkage_in_space(shown):
@@ -109,11 +109,11 @@ def test_rviz_opens_on_all_of_a_linkage_in_space(shown):
 @pytest.fixture
 def constants():
     """Return the launch file's constants and functions, without importing what it imports."""
-    found = {}
+    values = {}
     lines = [line for line in ast.parse(LAUNCH.read_text()).body
              if isinstance(line, (ast.Assign, ast.FunctionDef))]
-    exec(compile(ast.Module(lines, []), LAUNCH, 'exec'), found)
-    return found
+    exec(compile(ast.Module(lines, []), LAUNCH, 'exec'), values)
+    return values
 
 
 def test_the_launch_file_starts_executables_that_there_are(constants, setup_arguments):

@@ -72,10 +72,10 @@ def test_a_tree_of_mujoco_is_the_same_tree_as_urdf(tmp_path, seed):
     assert robot.positions == {name: data.joint(name).qpos[0] for name in names}
     assert robot.driven == [*names[::2], names[1]]
     positions = dict(zip(names, rng.normal(size=len(names)).tolist()))
-    found = Pinocchio(write(robot)).places(positions, tree.bodies)
+    places = Pinocchio(write(robot)).places(positions, tree.bodies)
     there.place(positions)
     for i, place in enumerate(data.xpos[1:]):
-        assert found[tree.bodies[i]] == pytest.approx(place, abs=1e-13)
+        assert places[tree.bodies[i]] == pytest.approx(place, abs=1e-13)
 
 
 TIES = {

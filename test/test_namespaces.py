@@ -54,19 +54,19 @@ def requested(kind):
     return mechanism.points, mechanism.joints, mechanism.joints
 
 
-def expected(kind, given):
+def expected(kind, inputs_):
     """Return the library's values, and the size of each output."""
-    rows = linkage(kind).compiled_pose(*requested(kind)).searched(*given)
+    rows = linkage(kind).compiled_pose(*requested(kind)).searched(*inputs_)
     # Some rates vanish, and are differences of others.
     return rows, np.fmax(np.nanmax(np.abs(rows), axis=1, keepdims=True),
                          min(linkage(kind).longest, 1.0))
 
 
-def errors(found, rows, sizes):
+def errors(results, rows, sizes):
     """Return errors in sizes; fail where one is NaN and the other is not."""
-    found = np.array([np.asarray(row) for row in found])
-    assert np.array_equal(np.isnan(found), np.isnan(rows))
-    return np.nan_to_num(np.abs(found - rows) / np.maximum(sizes, np.abs(rows)))
+    results = np.array([np.asarray(row) for row in results])
+    assert np.array_equal(np.isnan(results), np.isnan(rows))
+    return np.nan_to_num(np.abs(results - rows) / np.maximum(sizes, np.abs(rows)))
 
 
 @pytest.fixture(scope='module')
@@ -83,54 +83,54 @@ def other_device(strict):
 @pytest.mark.nightly(all_but=5)
 @pytest.mark.parametrize('kind', KINDS)
 def test_the_standard_is_enough_and_gives_the_bits_of_numpy(kind, strict):
-    given, device = inputs(kind, FEW), other_device(strict)
-    rows, _ = expected(kind, given)
+    inputs_, device = inputs(kind, FEW), other_device(strict)
+    rows, _ = expected(kind, inputs_)
     function = linkage(kind).function(*requested(kind), xp=strict)
-    found = function(*(strict.asarray(x, device=device) for x in given))
-    assert {(each.dtype, each.device, each.shape) for each in found} == {
+    results = function(*(strict.asarray(x, device=device) for x in inputs_))
+    assert {(each.dtype, each.device, each.shape) for each in results} == {
         (strict.float64, device, (FEW,))}
-    home = [np.asarray(each.to_device(strict.Device('CPU_DEVICE'))) for each in found]
+    home = [np.asarray(each.to_device(strict.Device('CPU_DEVICE'))) for each in results]
     assert np.array_equal(home, rows, equal_nan=True) and np.isfinite(rows).any()
 
 
 @pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('kind', KINDS)
 def test_nothing_on_the_way_is_nan(kind):
-    given = inputs(kind, FEW)
-    given[0][::7] = np.nan
-    given[-1][::11] = np.inf
+    inputs_ = inputs(kind, FEW)
+    inputs_[0][::7] = np.nan
+    inputs_[-1][::11] = np.inf
     function = linkage(kind).function(*requested(kind), xp=np)
     with np.errstate(divide='raise', invalid='raise', over='raise'):
-        found = function(*given)
+        results = function(*inputs_)
     with np.errstate(invalid='ignore'):
-        rows, _ = expected(kind, given)
-    known = ~np.isinf(given[-1])
-    assert np.array_equal(np.array(found)[:, known], rows[:, known], equal_nan=True)
+        rows, _ = expected(kind, inputs_)
+    known = ~np.isinf(inputs_[-1])
+    assert np.array_equal(np.array(results)[:, known], rows[:, known], equal_nan=True)
     # Of an infinite input all that moves is NaN, the input itself, too.
-    assert np.isnan(found)[~np.isfinite(rows)].all()
+    assert np.isnan(results)[~np.isfinite(rows)].all()
 
 
 @pytest.mark.parametrize('kind', ['five_bar', 'four_bar', 'ankle'])
 def test_single_precision_stays_single(kind, strict):
-    given = [x.astype('f4') for x in inputs(kind, FEW)]
-    rows, sizes = expected(kind, [x.astype(float) for x in given])
+    inputs_ = [x.astype('f4') for x in inputs(kind, FEW)]
+    rows, sizes = expected(kind, [x.astype(float) for x in inputs_])
     for xp, function in ((each, linkage(kind).function(*requested(kind), xp=each))
                          for each in (strict, np)):
-        found = function(*map(xp.asarray, given))
-        assert all(each.dtype == xp.float32 for each in found)
-        found = np.array([np.asarray(each) for each in found])
+        results = function(*map(xp.asarray, inputs_))
+        assert all(each.dtype == xp.float32 for each in results)
+        results = np.array([np.asarray(each) for each in results])
         # Next to the ends of its reach a pose may be there in one precision only.
-        there = np.isfinite(found) & np.isfinite(rows)
-        assert (np.isnan(found) == np.isnan(rows)).mean() > 0.99
-        assert np.quantile((np.abs(found - rows) / sizes)[there], 0.99) < 1e-4
+        there = np.isfinite(results) & np.isfinite(rows)
+        assert (np.isnan(results) == np.isnan(rows)).mean() > 0.99
+        assert np.quantile((np.abs(results - rows) / sizes)[there], 0.99) < 1e-4
 
 
 @pytest.mark.parametrize('shapes', [[(), (3, 2)], [(1,), (0,)], [(3, 1), (1, 2)], [(), ()]])
 def test_shapes_broadcast(shapes, strict):
     function = linkage('five_bar').function(xp=strict)
-    found = function(*(strict.full(shape, 1.0 + i) for i, shape in enumerate(shapes)))
+    results = function(*(strict.full(shape, 1.0 + i) for i, shape in enumerate(shapes)))
     pose = linkage('five_bar').function()(1.0, 2.0)
-    for each, value in zip(found, pose):
+    for each, value in zip(results, pose):
         assert each.shape == np.broadcast_shapes(*shapes)
         assert np.array_equal(np.asarray(each), np.full(each.shape, value))
 
@@ -141,10 +141,10 @@ def test_what_cannot_be_is_refused_in_a_sentence(strict):
     function, whole = arm.function(xp=strict), strict.asarray([1, 2])
     good, single = strict.asarray([1.0]), strict.asarray([1.0], dtype=strict.float32)
     half = np.array([1.0], 'f2')
-    for given in ((whole, whole), (good, single), (good, np.array([1.0])), (1.0, 2.0),
-                  (good, whole), (good, 2.0)):
+    for inputs_ in ((whole, whole), (good, single), (good, np.array([1.0])), (1.0, 2.0),
+                    (good, whole), (good, 2.0)):
         with pytest.raises(ValueError, match='all float64 or all float32'):
-            function(*given)
+            function(*inputs_)
     with pytest.raises(ValueError, match='got float16'):
         leg.function(xp=np)(half)
     with pytest.raises(ValueError, match='needed: 2 arrays .* got array_api_strict.float64$'):
@@ -159,19 +159,19 @@ def test_what_cannot_be_is_refused_in_a_sentence(strict):
 
 def questions(kind, count):
     """Return values of the outputs and inputs beside those that they are from."""
-    given, outputs = inputs(kind, count), INVERSES[kind]
+    inputs_, outputs = inputs(kind, count), INVERSES[kind]
     rng = np.random.default_rng(1)
-    values = linkage(kind).compiled('checked', outputs).searched(*given)
+    values = linkage(kind).compiled('checked', outputs).searched(*inputs_)
     near = [x + 0.2 * each.size * rng.uniform(-1.0, 1.0, count)
-            for x, each in zip(given, linkage(kind).inputs)]
+            for x, each in zip(inputs_, linkage(kind).inputs)]
     return list(values[:len(outputs)]), near
 
 
 def answers(kind, values, near):
     """Return the library's choice, and the sizes of the inputs."""
     inverse = linkage(kind).inverse(INVERSES[kind])
-    found = np.array(inverse.nearest(tuple(values), None if near is None else tuple(near))[0])
-    return found, np.reshape([each.size for each in inverse.inputs], (-1, 1))
+    results = np.array(inverse.nearest(tuple(values), None if near is None else tuple(near))[0])
+    return results, np.reshape([each.size for each in inverse.inputs], (-1, 1))
 
 
 @pytest.mark.nightly(all_but=4)
@@ -181,10 +181,10 @@ def test_the_inverse_chooses_as_the_library_does(kind, follows, strict):
     values, near = questions(kind, FEW)
     rows, sizes = answers(kind, values, near if follows else None)
     device = other_device(strict)
-    found = linkage(kind).inverse(INVERSES[kind]).function(strict, follows)(*(
+    results = linkage(kind).inverse(INVERSES[kind]).function(strict, follows)(*(
         strict.asarray(x, device=device) for x in (*values, *(near if follows else ()))))
-    assert {(each.dtype, each.device) for each in found} == {(strict.float64, device)}
-    off = errors([each.to_device(strict.Device('CPU_DEVICE')) for each in found], rows, sizes)
+    assert {(each.dtype, each.device) for each in results} == {(strict.float64, device)}
+    off = errors([each.to_device(strict.Device('CPU_DEVICE')) for each in results], rows, sizes)
     # What is next to a dead point of the inverse loses digits; no other answer does.
     assert np.quantile(off, 0.99) < EXACT and off.max() < 1e-8
     assert np.isfinite(rows).any()
@@ -194,9 +194,9 @@ def test_the_inverse_chooses_as_the_library_does(kind, follows, strict):
 @pytest.mark.parametrize('kind', ['geared', 'Scotch yoke', 'Oldham coupling', *(
     kind for kind in mechanisms.TYPES if kind not in ('jansen', 'five_bar'))])
 def test_every_output_has_the_library_s_choice(kind):
-    mechanism, (given,) = linkage(kind), inputs(kind, FEW)
+    mechanism, (inputs_,) = linkage(kind), inputs(kind, FEW)
     rng, tried = np.random.default_rng(3), 0
-    near = given + rng.uniform(-0.2, 0.2, FEW)
+    near = inputs_ + rng.uniform(-0.2, 0.2, FEW)
     first, *_, last = mechanism.points
     pairs = *mechanism.bars, (first, last), (last, first)
     for output in (*mechanism.joints, *(f'{p}.{axis}' for p in mechanism.points for axis in 'xy'),
@@ -207,13 +207,13 @@ def test_every_output_has_the_library_s_choice(kind):
             continue  # it does not move
         if not inverse.closed:
             continue
-        values = mechanism.compiled_pose((), (output,)).searched(given)[0]
+        values = mechanism.compiled_pose((), (output,)).searched(inputs_)[0]
         values += math.tau * rng.integers(-2, 3, FEW) * mechanism.is_angle(output)
         follows, tried = tried % 2 > 0, tried + 1
         with np.errstate(divide='raise', invalid='raise', over='raise'):
-            found, = inverse.function(np, follows)(values, *[near] * follows)
+            results, = inverse.function(np, follows)(values, *[near] * follows)
         expected_, = inverse.nearest((values,), (near,) if follows else None)[0]
-        np.testing.assert_allclose(found, expected_, 0.0, 1e-6, err_msg=output)
+        np.testing.assert_allclose(results, expected_, 0.0, 1e-6, err_msg=output)
     assert tried > 2
 
 
@@ -222,9 +222,9 @@ def test_in_single_precision_solutions_next_to_a_dead_point_are_there():
         'A ground 0 -4.7e5', 'C ground 1.8e6 0', 'D crank C 1.2e6', 'E antiparallelogram C D A'))
     inverse = large.inverse('E.y')
     cranks = next(place for place in large.dead_points() if place > 0.0) + np.linspace(-0.01, 0.01)
-    found, = inverse.function(np, follows=True)(*(x.astype('f4') for x in (
+    results, = inverse.function(np, follows=True)(*(x.astype('f4') for x in (
         large.joint_angles(cranks, ['E.y'])['E.y'], cranks)))
-    np.testing.assert_allclose(found, cranks, atol=1e-3)
+    np.testing.assert_allclose(results, cranks, atol=1e-3)
 
 
 @pytest.mark.nightly(all_but=4)
@@ -259,23 +259,23 @@ def jax():
     return package
 
 
-def slopes(package, xp, kind, function, given):
+def slopes(package, xp, kind, function, inputs_):
     """Return the derivatives (outputs, inputs, poses) of a function of arrays."""
     if package == 'jax':
-        found = xp.vmap(xp.jacfwd(lambda *x: xp.numpy.stack(function(*x)), tuple(
-            range(len(given)))))
+        results = xp.vmap(xp.jacfwd(lambda *x: xp.numpy.stack(function(*x)), tuple(
+            range(len(inputs_)))))
         # One vectorized function, compiled unless it is long.
-        found = found if kind == 'ankle' else xp.jit(found)
-        return np.array(found(*map(xp.numpy.asarray, given))).transpose(2, 0, 1)
-    given = [xp.tensor(x, requires_grad=True) for x in given]
+        results = results if kind == 'ankle' else xp.jit(results)
+        return np.array(results(*map(xp.numpy.asarray, inputs_))).transpose(2, 0, 1)
+    inputs_ = [xp.tensor(x, requires_grad=True) for x in inputs_]
     return np.array([[np.zeros(len(x)) if slope is None else slope.numpy() for x, slope in zip(
-        given, xp.autograd.grad(each.nansum(), given, retain_graph=True, allow_unused=True))]
-        for each in function(*given)])
+        inputs_, xp.autograd.grad(each.nansum(), inputs_, retain_graph=True, allow_unused=True))]
+        for each in function(*inputs_)])
 
 
-def check_values(kind, found, given):
+def check_values(kind, results, inputs_):
     """Fail unless points and angles are those of the library, and rates but in few poses."""
-    off = errors(found, *expected(kind, given))
+    off = errors(results, *expected(kind, inputs_))
     points, joints, _ = requested(kind)
     values = len(linkage(kind).axes) * len(points) + len(joints)
     assert off[:values].max() <= EXACT and np.quantile(off[values:].max(axis=0), 0.999) <= RATED
@@ -292,24 +292,24 @@ def check_slopes(slopes, rates):
 
 def moving(kind):
     """Return the joints whose rates are compared, and the library's (outputs, inputs, poses)."""
-    mechanism, given = linkage(kind), inputs(kind, MANY)
+    mechanism, inputs_ = linkage(kind), inputs(kind, MANY)
     joints = ('pitch', 'roll') if kind == 'ankle' else mechanism.joints
-    rates = mechanism.compiled_pose((), (), joints).searched(*given)
-    return joints, given, rates.reshape(len(given), len(joints), MANY).swapaxes(0, 1)
+    rates = mechanism.compiled_pose((), (), joints).searched(*inputs_)
+    return joints, inputs_, rates.reshape(len(inputs_), len(joints), MANY).swapaxes(0, 1)
 
 
 @pytest.mark.nightly
 @pytest.mark.parametrize('package', ['torch', 'jax'])
 @pytest.mark.parametrize('kind', KINDS)
 def test_both_have_the_values_and_the_rates(kind, package, request):
-    xp, given = request.getfixturevalue(package), inputs(kind, MANY)
+    xp, inputs_ = request.getfixturevalue(package), inputs(kind, MANY)
     names = xp if package == 'torch' else xp.numpy
     function = linkage(kind).function(*requested(kind), xp=names)
     for each in (function, xp.vmap(function)):
         each = each if package == 'torch' else xp.jit(each)
-        check_values(kind, [np.asarray(x) for x in each(*map(names.asarray, given))], given)
-    joints, given, rates = moving(kind)
-    check_slopes(slopes(package, xp, kind, linkage(kind).function((), joints, xp=names), given),
+        check_values(kind, [np.asarray(x) for x in each(*map(names.asarray, inputs_))], inputs_)
+    joints, inputs_, rates = moving(kind)
+    check_slopes(slopes(package, xp, kind, linkage(kind).function((), joints, xp=names), inputs_),
                  rates)
 
 
@@ -319,17 +319,17 @@ def test_both_have_the_values_and_the_rates(kind, package, request):
 def test_both_have_the_inverse_and_its_rates(kind, package, request):
     values, near = questions(kind, MANY)
     rows, sizes = answers(kind, values, near)
-    xp, given = request.getfixturevalue(package), [*values, *near]
+    xp, inputs_ = request.getfixturevalue(package), [*values, *near]
     names = xp if package == 'torch' else xp.numpy
     function = linkage(kind).inverse(INVERSES[kind]).function(names, follows=True)
-    off = errors([np.asarray(x) for x in function(*map(names.asarray, given))], rows, sizes)
+    off = errors([np.asarray(x) for x in function(*map(names.asarray, inputs_))], rows, sizes)
     # What is next to a dead point of the inverse loses digits; no other answer does.
     assert np.quantile(off, 0.99) < EXACT and off.max() < 1e-8
-    found, n = slopes(package, xp, kind, function, given), len(rows)
-    assert not found[:, n:].any() and np.isfinite(found).all()
+    results, n = slopes(package, xp, kind, function, inputs_), len(rows)
+    assert not results[:, n:].any() and np.isfinite(results).all()
     rates = linkage(kind).compiled_pose((), INVERSES[kind], INVERSES[kind]).searched(*rows)[n:]
     # The derivatives of an inverse are the inverse of the derivatives, by input and output.
-    product = np.einsum('ijk,ljk->lik', rates.reshape(n, n, -1), found[:, :n])
+    product = np.einsum('ijk,ljk->lik', rates.reshape(n, n, -1), results[:, :n])
     off = abs(product - np.eye(n)[..., None]).max(axis=(0, 1))
     known = np.isfinite(off)
     assert known.mean() > 0.3 and np.quantile(off[known], 0.99) < RATED
@@ -337,13 +337,13 @@ def test_both_have_the_inverse_and_its_rates(kind, package, request):
 
 @pytest.mark.nightly
 def test_torch_compiles_and_exports(torch):
-    given = [torch.tensor(x) for x in inputs('five_bar', FEW)]
+    inputs_ = [torch.tensor(x) for x in inputs('five_bar', FEW)]
     function = linkage('five_bar').function(*requested('five_bar'), xp=torch)
 
     class Module(torch.nn.Module):
         def forward(self, one, other):
             return function(one, other)
 
-    exported = torch.export.export(Module(), tuple(given)).module()
+    exported = torch.export.export(Module(), tuple(inputs_)).module()
     for each in (torch.compile(function, fullgraph=True), exported):
-        check_values('five_bar', [x.numpy() for x in each(*given)], [x.numpy() for x in given])
+        check_values('five_bar', [x.numpy() for x in each(*inputs_)], [x.numpy() for x in inputs_])

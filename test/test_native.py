@@ -160,14 +160,14 @@ def sides(rng):
 @pytest.mark.parametrize('name, values, most', [
     ('sin', angles, 1.0), ('cos', angles, 1.0), ('atan2', sides, 2.0)])
 def test_elementary_functions_are_off_by_less_than_an_ulp_or_two(name, values, most):
-    given = values(np.random.default_rng(0))
-    assert off(name, given, by_lanes(name, given)) < most
+    numbers = values(np.random.default_rng(0))
+    assert off(name, numbers, by_lanes(name, numbers)) < most
 
 
 def asked(linkage, thetas):
     """Return places and angles as one array, a row for each theta."""
-    found = {**linkage.solve(thetas), **linkage.joint_angles(thetas)}
-    return np.column_stack([values.reshape(thetas.size, -1) for values in found.values()])
+    quantities = {**linkage.solve(thetas), **linkage.joint_angles(thetas)}
+    return np.column_stack([values.reshape(thetas.size, -1) for values in quantities.values()])
 
 
 @pytest.mark.parametrize('kind', ['jansen', 'slotted_lever'])

@@ -90,13 +90,13 @@ def test_after_a_slip_of_the_worker_messages_are_answered(graph, slips, log, top
 
 
 def test_after_a_slip_the_timer_goes_on(graph, slips, log):
-    heard = graph.listen(JointState, 'crank_states', 100)
+    messages = graph.listen(JointState, 'crank_states', 100)
     node = graph.start(CrankDriver, LEVER)
-    graph.until(lambda: heard)
+    graph.until(lambda: messages)
     slips['crank_states'] = 1
     graph.until(lambda: not slips['crank_states'])
-    heard.clear()
-    graph.until(lambda: len(heard) > 3)
+    messages.clear()
+    graph.until(lambda: len(messages) > 3)
     logged_once(graph, node, log)
 
 
@@ -177,20 +177,20 @@ def test_after_a_slip_a_service_answers(graph, log, service, kind, request_):
     logged_once(graph, node, log)
 
 
-@pytest.mark.parametrize('topic, kind, answer, wanted', [
+@pytest.mark.parametrize('topic, kind, answer, request', [
     ('wanted_states', JointState, 'servo_commands',
      JointState(name=['lever_lever'], position=[0.1])),
     ('wanted_trajectory', JointTrajectory, 'servo_trajectory', JointTrajectory(
         joint_names=['lever_lever'], points=[JointTrajectoryPoint(positions=[0.1])]))],
     ids=['wanted_states', 'wanted_trajectory'])
-def test_after_a_slip_the_next_command_is_given(graph, slips, log, topic, kind, answer, wanted):
+def test_after_a_slip_the_next_command_is_given(graph, slips, log, topic, kind, answer, request):
     node = graph.start(ServoInverse, LEVER)
     publisher, answers = graph.publisher(kind, topic), graph.listen(kind, answer)
     graph.until(lambda: node.count_subscribers(answer))
     slips[answer] = 1
-    publisher.publish(wanted)
+    publisher.publish(request)
     graph.until(lambda: not slips[answer])
-    publisher.publish(wanted)
+    publisher.publish(request)
     graph.until(lambda: answers)
     logged_once(graph, node, log, topic)
 

@@ -83,9 +83,9 @@ def by_dimensions(name, values):
     keys = 'abc'[:arity(name)]
     node = applied(name, [expression.dimension(key, positive=False) for key in keys])
     with np.errstate(all='ignore'):
-        found = program.evaluate(node, dict(zip(keys, values)), {})
+        results = program.evaluate(node, dict(zip(keys, values)), {})
         alone = [program.evaluate(node, dict(zip(keys, row)), {}) for row in zip(*values)]
-    assert np.array_equal(found, alone, equal_nan=True) or name in ELEMENTARY
+    assert np.array_equal(results, alone, equal_nan=True) or name in ELEMENTARY
     return np.asarray(alone)
 
 
@@ -139,15 +139,15 @@ def truths(name, values):
     return [TRUTH[name](*map(gmpy2.mpfr, map(float, row))) for row in zip(*values)]
 
 
-def off(name, values, found):
+def off(name, values, results):
     """Return by how many ulps of its own kind of number an operation is off at most."""
     with gmpy2.context(precision=300):
         true = truths(name, tuple(map(tuple, values)))
         gone = np.array([gmpy2.is_nan(x) for x in true])
-        assert np.array_equal(np.isnan(found), gone) and not gone.all()
+        assert np.array_equal(np.isnan(results), gone) and not gone.all()
         return max(float(abs(gmpy2.mpfr(float(value)) - x))
-                   / float(np.spacing(np.abs(found.dtype.type(x))))
-                   for value, x in zip(found, true) if not gmpy2.is_nan(x))
+                   / float(np.spacing(np.abs(results.dtype.type(x))))
+                   for value, x in zip(results, true) if not gmpy2.is_nan(x))
 
 
 def test_there_is_a_truth_for_each():
@@ -184,10 +184,10 @@ def test_infinity_zeros_and_nan_are_the_same_to_all(name, c_library):
     values = numbers(name, special=True)
     expected = by_arrays(name, values)
     zero = expected == 0.0
-    for found in (by_floats(name, values), by_dimensions(name, values), by_loop(name, values),
-                  by_lanes(name, values), c_library(name, values, np.float64)):
-        np.testing.assert_allclose(found, expected, rtol=1e-15, atol=0.0)
-        assert np.array_equal(np.signbit(found)[zero], np.signbit(expected)[zero])
+    for results in (by_floats(name, values), by_dimensions(name, values), by_loop(name, values),
+                    by_lanes(name, values), c_library(name, values, np.float64)):
+        np.testing.assert_allclose(results, expected, rtol=1e-15, atol=0.0)
+        assert np.array_equal(np.signbit(results)[zero], np.signbit(expected)[zero])
 
 
 def test_a_constant_is_known_to_be_positive_if_it_is():
@@ -198,8 +198,8 @@ def test_a_constant_is_known_to_be_positive_if_it_is():
 @pytest.mark.parametrize('name', NAMES)
 def test_constants_come_to_what_floats_do(name):
     values = numbers(name)
-    found = by_floats(name, values)
-    for row, value in zip(zip(*values), found.tolist()):
+    results = by_floats(name, values)
+    for row, value in zip(zip(*values), results.tolist()):
         folded = applied(name, list(map(expression.real, row)))
         if folded.value is not None:
             assert folded.value == value
@@ -250,8 +250,8 @@ def test_a_sum_keeps_every_digit_however_much_cancels():
             terms = rng.uniform(-1.0, 1.0, count) * 2.0 ** rng.integers(-30, 30, count)
             terms[-1] = -math.fsum(terms[:-1]) * (1.0 + rng.integers(-2, 3) * 2.0 ** -52)
             values = dict(zip(names, terms.tolist()))
-            found = program.evaluate(node, {**values, 'b': -values['b']}, {})
-            assert found == math.fsum(terms)
+            results = program.evaluate(node, {**values, 'b': -values['b']}, {})
+            assert results == math.fsum(terms)
 
 
 def test_a_sum_of_many_terms_costs_no_more_than_adding_them_up():

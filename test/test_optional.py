@@ -143,10 +143,10 @@ def test_a_node_moves_without_machine_code_and_says_why_once(harness, tmp_path, 
                 'jansen/joint_states'))
             assert not process.has_ended, process.end()[1]
             state = graph.crank(['jansen_crank'])([0.3], answers)
-        found = dict(zip(state.name, state.position))
+        positions = dict(zip(state.name, state.position))
         for joint, value in mechanisms.create('jansen').joint_angles(0.3).items():
             leg = '' if joint == 'crank' else 'left0_'
-            assert found[f'jansen_{leg}{joint}'] == pytest.approx(float(value))
+            assert positions[f'jansen_{leg}{joint}'] == pytest.approx(float(value))
     finally:
         process.interrupt(signal.SIGINT)
         code, printed = process.end()

@@ -35,6 +35,7 @@ def test_whatever_happens_the_node_publishes_what_the_library_says(name, seeds, 
 
 FIVE_BAR = {'mechanisms': ['m'], 'm.type': 'five_bar'}
 LEG = {'mechanisms': ['m'], 'm.type': 'jansen'}
+WALKER = {**LEG, 'm.leg_pairs': 3, 'm.dimensions.a': 10.0, 'm.dimensions.m': 22.0}
 LOADED = {
     'a lever': {'mechanisms': ['a', 'b'], 'a.type': 'slotted_lever', 'b.type': 'jansen',
                 'a.loads': ['L=0 -9.81']},
@@ -58,8 +59,10 @@ SHORT = {
     'markers that a change leaves nothing of': (LEG, [
         *everything(LEG), message({'m_crank': 0.5}), ('set', {'m.points': ['O', 'G']})]),
     'an input of two': (FIVE_BAR, [
-        *everything(FIVE_BAR), message({'m_crank': 0.5}), message({'m_crank': 0.6}),
-        message({'m_crank2': 0.1}), ('set', {'frame_id': 'map'})]),
+        *everything(FIVE_BAR), message({'m_crank': 0.5}), message({'m_crank': 0.6}, [1.0]),
+        message({'m_crank2': 0.1}, [1.0, 2.0]), ('set', {'frame_id': 'map'}),
+        ('set', {'frame_prefix': 'left/'})]),
+    'legs that are left out': (WALKER, [*everything(WALKER), message({'m_crank': 1.5}, [1.0])]),
     # What was received is read anew.
     **{f'what was received of a {source} before a change': (MEASURED, [
         *everything(MEASURED), GOOD, OTHER, ('set', change)]) for source, change in (

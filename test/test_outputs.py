@@ -27,9 +27,9 @@ def measured(linkage, output, theta):
 def test_distances_and_angles_are_those_of_the_joints(type_, output, shape):
     linkage = mechanisms.create(type_)
     theta = np.resize([0.3, 1.1, -2.0, 2.9, 0.0, -0.7], shape)
-    found = linkage.joint_angles(theta, [output])[output]
-    assert found.shape == shape
-    np.testing.assert_allclose(found, measured(linkage, output, theta), rtol=1e-13, atol=1e-13)
+    values_ = linkage.joint_angles(theta, [output])[output]
+    assert values_.shape == shape
+    np.testing.assert_allclose(values_, measured(linkage, output, theta), rtol=1e-13, atol=1e-13)
 
 
 @pytest.mark.parametrize('type_, output', ASKED)
@@ -51,8 +51,9 @@ def test_an_output_that_turns_all_round_takes_the_crank_along(turns):
     for crank in (-3.2, -3.1, 0.0, 3.1, 3.2, 9.4):
         value = float(linkage.joint_angles(crank)['lever'])
         for near in (crank - 0.2, crank + 0.2):
-            found, _ = linkage.follow('lever', value, near + math.tau * turns)
-            assert found - math.tau * turns == pytest.approx(crank, abs=1e-15 * abs(turns) + 1e-14)
+            followed, _ = linkage.follow('lever', value, near + math.tau * turns)
+            error = followed - math.tau * turns - crank
+            assert error == pytest.approx(0.0, abs=1e-15 * abs(turns) + 1e-14)
 
 
 @pytest.mark.parametrize('value', [1e6, -1e9, 1e15, 1e22, -1e300])
@@ -60,9 +61,9 @@ def test_whole_turns_of_a_wanted_angle_cost_no_digits(value):
     linkage = mechanisms.create('whitworth')
     with gmpy2.context(precision=1400):
         value_in_turn = float(gmpy2.atan2(*gmpy2.sin_cos(gmpy2.mpfr(value))))
-    wanted, = linkage.input_for('angle(Q,L)', value_in_turn)
-    assert linkage.input_for('angle(Q,L)', value) == pytest.approx(wanted, abs=1e-14)
-    found, _ = linkage.follow('angle(Q,L)', value, wanted)
-    assert found == pytest.approx(wanted, abs=1e-14)
+    expected, = linkage.input_for('angle(Q,L)', value_in_turn)
+    assert linkage.input_for('angle(Q,L)', value) == pytest.approx(expected, abs=1e-14)
+    crank, _ = linkage.follow('angle(Q,L)', value, expected)
+    assert crank == pytest.approx(expected, abs=1e-14)
 
 

@@ -23,50 +23,51 @@ A = 'lever.dimensions.a'
 @pytest.fixture
 def warned(monkeypatch):
     """Gather the warnings of all nodes."""
-    said = []
-    monkeypatch.setattr(RcutilsLogger, 'warning', lambda _, text: said.append(text))
-    return said
+    warnings = []
+    monkeypatch.setattr(RcutilsLogger, 'warning', lambda _, text: warnings.append(text))
+    return warnings
 
 
 def of(node, name=A):
     """Return a parameter's value, as the scene has it."""
-    found, = [p for p in node.scene.parameters if p.name == name]
-    assert node.has_parameter(name) == (found.field.owner == node.get_name())
+    parameter, = [p for p in node.scene.parameters if p.name == name]
+    assert node.has_parameter(name) == (parameter.field.owner == node.get_name())
     assert not node.has_parameter(name) or scene.plain(
-        node.get_parameter(name).value) == found.value
-    return found.value
+        node.get_parameter(name).value) == parameter.value
+    return parameter.value
 
 
 @pytest.mark.parametrize('namespace', ['', '/left'])
 def test_an_owner_announces_all_its_values_and_then_each_change(graph, monkeypatch, namespace):
     monkeypatch.setattr(LATCHED, 'depth', 3)
-    heard = graph.listen(ParameterEvent, f'{namespace}/{TOPIC}', LATCHED)
+    events = graph.listen(ParameterEvent, f'{namespace}/{TOPIC}', LATCHED)
     before = graph.node.get_clock().now().nanoseconds
     owner, follower = (graph.start(kind, LEVER, namespace=namespace)
                        for kind in (Kinematics, CrankDriver))
-    graph.until(lambda: heard)
+    graph.until(lambda: events)
     for a in (90.0, 91.0, 92.0, 93.0):
         assert graph.set(owner, lever__dimensions__a=a, lever__scale=2.0).successful
-    graph.until(lambda: len(heard) == 6 and of(follower) == 93.0)
-    heard = [event for event in heard if event.node == f'{namespace}/kinematics']
+    graph.until(lambda: len(events) == 6 and of(follower) == 93.0)
+    events = [event for event in events if event.node == f'{namespace}/kinematics']
 
-    def own(**values):
-        return {one.name: (Parameter.Type[one.field.kind.upper()], one.value)
-                for one in scene.read({**LEVER, **values}).parameters
-                if one.field.owner == scene.KINEMATICS}
+    def owned(**values):
+        return {parameter.name: (Parameter.Type[parameter.field.kind.upper()], parameter.value)
+                for parameter in scene.read({**LEVER, **values}).parameters
+                if parameter.field.owner == scene.KINEMATICS}
 
-    def said(messages):
-        return {one.name: (one.type_, scene.plain(one.value))
-                for one in map(Parameter.from_parameter_msg, messages)}
+    def values_of(messages):
+        return {parameter.name: (parameter.type_, scene.plain(parameter.value))
+                for parameter in map(Parameter.from_parameter_msg, messages)}
 
     double = Parameter.Type.DOUBLE
-    assert [(said(event.new_parameters), said(event.changed_parameters)) for event in heard] == [
-        (own(), {}), ({}, {A: (double, 90.0), 'lever.scale': (double, 2.0)}),
-        ({}, {A: (double, 91.0)}), (own(**{A: 92.0, 'lever.scale': 2.0}), {}),
-        ({}, {A: (double, 93.0)})]
-    times = [event.stamp.sec * 10 ** 9 + event.stamp.nanosec for event in heard]
+    assert [[values_of(event.new_parameters), values_of(event.changed_parameters)]
+            for event in events] == [
+        [owned(), {}], [{}, {A: (double, 90.0), 'lever.scale': (double, 2.0)}],
+        [{}, {A: (double, 91.0)}], [owned(**{A: 92.0, 'lever.scale': 2.0}), {}],
+        [{}, {A: (double, 93.0)}]]
+    times = [event.stamp.sec * 10 ** 9 + event.stamp.nanosec for event in events]
     assert before < times[0] and times == sorted(times)
-    assert not any(event.deleted_parameters for event in heard)
+    assert not any(event.deleted_parameters for event in events)
 
 
 def test_a_set_on_a_follower_is_refused_with_the_node_where_it_works(graph):
@@ -84,11 +85,11 @@ def test_other_values_at_the_start_of_either_are_said_once_and_followed(
     service = graph.start(ServoInverse, {**LEVER, A: 81.0})
     owner = graph.start(Kinematics, {**LEVER, A: 82.0})
     graph.until(lambda: of(service) == 82.0)
-    said = f'/kinematics has other values, which are followed: {A} was 81.0 and is now 82.0'
-    assert warned == [said]
+    warning = f'/kinematics has other values, which are followed: {A} was 81.0 and is now 82.0'
+    assert warned == [warning]
     late = graph.start(CrankDriver, {**LEVER, A: 83.0})
     graph.until(lambda: of(late) == 82.0)
-    assert warned == [said, said.replace('81.0', '83.0')]
+    assert warned == [warning, warning.replace('81.0', '83.0')]
     # A change while all run is no news.
     assert graph.set(owner, lever__dimensions__a=84.0).successful
     graph.until(lambda: of(service) == of(late) == 84.0)
@@ -98,7 +99,7 @@ def test_other_values_at_the_start_of_either_are_said_once_and_followed(
     graph.until(lambda: graph.node.count_publishers(TOPIC) == 1)
     graph.start(Kinematics, {**LEVER, A: 82.0})
     graph.until(lambda: of(service) == of(late) == 82.0)
-    assert warned[2:] == [said.replace('81.0', '84.0')] * 2
+    assert warned[2:] == [warning.replace('81.0', '84.0')] * 2
 
 
 def test_other_mechanisms_are_said_and_the_rest_is_followed(graph, warned):
@@ -138,7 +139,7 @@ def test_of_values_that_change_and_change_back_the_last_holds(graph):
 def test_an_announcement_with_a_value_that_makes_no_sense_is_passed_over(graph, capfd):
     service = graph.start(ServoInverse, LEVER)
     publisher = graph.node.create_publisher(ParameterEvent, TOPIC, LATCHED)
-    heard = graph.listen(ParameterEvent, TOPIC, LATCHED)
+    events = graph.listen(ParameterEvent, TOPIC, LATCHED)
     good = [Parameter('mechanisms', value=['lever']), Parameter(A, value=90.0),
             Parameter('', value=1.0), Parameter('x' * 10 ** 5, value=1.0)]
     nonsense = [[Parameter('mechanisms', value=value)]
@@ -150,11 +151,11 @@ def test_an_announcement_with_a_value_that_makes_no_sense_is_passed_over(graph, 
     messages.insert(0, [ParameterMessage(name=A, value=ParameterValue(type=200))])
     for number, values in enumerate(messages):
         publisher.publish(ParameterEvent(node=f'/odd{number}', changed_parameters=values))
-        graph.until(lambda number=number: len(heard) > number)
+        graph.until(lambda number=number: len(events) > number)
         assert number == len(messages) - 1 or of(service) == 80.0
     graph.until(lambda: of(service) == 90.0)
-    said = capfd.readouterr().err
-    assert 'internal error in scene_parameters' in said and len(said) < 2000
+    log = capfd.readouterr().err
+    assert 'internal error in scene_parameters' in log and len(log) < 2000
 
 
 def test_what_a_follower_refused_is_followed_with_the_value_that_it_waits_for(graph, warned):

@@ -80,8 +80,8 @@ def test_the_picture_is_zoomed_shifted_and_turned_by_keys_and_mouse(start):
         if len(first) < 100 or not np.array_equal(first, second):
             return None
         place = first.mean(axis=0), np.ptp(first, axis=0)
-        far = [abs(value - wanted).max() for value, wanted in zip(place, (middle, size))
-               if wanted is not None]
+        far = [abs(value - expected).max() for value, expected in zip(place, (middle, size))
+               if expected is not None]
         return place if max(far, default=0.0) < 6.0 else None
 
     middle, size = until(locus)
@@ -166,7 +166,7 @@ def test_numbers_are_arithmetic_in_the_unit_that_is_shown_and_branches_are_butto
     running, seen = start(LEVER, 'lever')
     for text, value in (('80,5', 80.5), ('2*(40+5)', 90.0)):
         seen.type('lever', 'a', text)
-        until(lambda wanted=value: running.value('lever.dimensions.a') == wanted)
+        until(lambda expected=value: running.value('lever.dimensions.a') == expected)
         assert seen.reason('lever', 'a') == ''
     for text, start in (('1,234.5', '1.234.5'), ('b/2', 'b/2'), ('1e400', '1e400')):
         seen.type('lever', 'a', text)
@@ -177,8 +177,8 @@ def test_numbers_are_arithmetic_in_the_unit_that_is_shown_and_branches_are_butto
     seen.value('workshop.click()')
     for text, angle in (('90deg', 0.5 * math.pi), ('pi/3', math.pi / 3.0), ('2*15', math.pi / 6)):
         seen.type('lever', 'crank', text)
-        until(lambda wanted=angle: running.value('lever.crank.start')
-              == pytest.approx(wanted, abs=1e-12))
+        until(lambda expected=angle: running.value('lever.crank.start')
+              == pytest.approx(expected, abs=1e-12))
     inward = seen.button('in')
     seen.value(f'{inward}.scrollIntoView()')
     seen.click(inward)
@@ -212,8 +212,9 @@ def test_a_bar_and_its_slider_light_up(start):
 def test_changes_are_saved_undone_and_reset(start, tmp_path):
     running, seen = start(LEG)
 
-    def becomes(**wanted):
-        until(lambda: {name: running.value(f'leg.dimensions.{name}') for name in wanted} == wanted)
+    def becomes(**expected):
+        until(lambda: expected == {
+            name: running.value(f'leg.dimensions.{name}') for name in expected})
 
     seen.output('leg', 'BC')
     seen.type('leg', 'h', '60.5')
@@ -388,8 +389,8 @@ def test_an_input_is_moved_with_the_keys_by_steps_and_in_degrees(start):
 
 @pytest.mark.nightly
 def test_a_plot_follows_what_is_tuned_and_all_can_be_downloaded(start, tmp_path):
-    given = {**LEG, 'leg.scale': 0.01, 'leg.leg_pairs': 2, 'leg.crank.speed': -2.0}
-    running, seen = start(given)
+    parameters = {**LEG, 'leg.scale': 0.01, 'leg.leg_pairs': 2, 'leg.crank.speed': -2.0}
+    running, seen = start(parameters)
     section = seen.section('leg')
     plot = f'{section}.querySelector(".plot")'
 

@@ -66,23 +66,24 @@ def written(rng):
 
 def of_ros(path, name, expected):
     """Return what a node is given by a file, or why it is not started."""
-    given = {'cli_args': ['--ros-args', '--params-file', str(path)], 'enable_rosout': False,
-             'use_global_arguments': False, 'start_parameter_services': False}
+    arguments = {'cli_args': ['--ros-args', '--params-file', str(path)], 'enable_rosout': False,
+                 'use_global_arguments': False, 'start_parameter_services': False}
     try:
         node = Node(name, allow_undeclared_parameters=True,
-                    automatically_declare_parameters_from_overrides=True, **given)
-        found = node.get_parameters_by_prefix('')
+                    automatically_declare_parameters_from_overrides=True, **arguments)
+        parameters = node.get_parameters_by_prefix('')
     except Exception as error:
         refused = re.search(r'Error: (.*?)\s*, at /', str(error), re.DOTALL)
         if refused:
             return refused[1]
         # An empty list has no type, and is declared only by name.
-        node = Node(name, **given)
-        found = {key: node.declare_parameter(key, None, ParameterDescriptor(dynamic_typing=True))
-                 for key in expected}
+        node = Node(name, **arguments)
+        dynamic = ParameterDescriptor(dynamic_typing=True)
+        parameters = {key: node.declare_parameter(key, None, dynamic)
+                      for key in expected}
     node.destroy_node()
-    return {key: list(one.value) if hasattr(one.value, 'tolist') else one.value
-            for key, one in found.items() if key not in OF_ROS}
+    return {key: list(parameter.value) if hasattr(parameter.value, 'tolist') else parameter.value
+            for key, parameter in parameters.items() if key not in OF_ROS}
 
 
 def alike(ros, ours):
@@ -154,6 +155,6 @@ kinematics:
 /robot/kinematics:
   ros__parameters: {jansen.scale: 3.0}
 """)
-    found = scene.load(str(path))
-    assert (found.rate, found.mechanisms['jansen'].first.speed) == (100.0, 2.5)
-    assert found.mechanisms['jansen'].scale == 2.0
+    loaded = scene.load(str(path))
+    assert (loaded.rate, loaded.mechanisms['jansen'].first.speed) == (100.0, 2.5)
+    assert loaded.mechanisms['jansen'].scale == 2.0

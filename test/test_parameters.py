@@ -275,14 +275,14 @@ def test_a_set_among_a_thousand_mechanisms_costs_what_it_changes():
 
 def test_each_of_many_sets_gets_its_own_answer(graph):
     node = graph.start(Slow, LEG)
-    wanted = [('leg.scale', 2), ('leg.scale', -1.0), ('leg.scale', 'wide'),
-              ('leg.branches.C', 7), ('frame_id', 'map'), ('leg.type', 'klann'),
-              ('leg.pose', None)]
+    changes = [('leg.scale', 2), ('leg.scale', -1.0), ('leg.scale', 'wide'),
+               ('leg.branches.C', 7), ('frame_id', 'map'), ('leg.type', 'klann'),
+               ('leg.pose', None)]
     client = Client(graph, node)
-    results = client.set(*wanted)
+    results = client.set(*changes)
     # Each value is valid by itself or not; the valid ones are set together or not at all.
     assert [r.successful for r in results] == [True, False, False, False, True, False, False]
-    for (name, _), result in zip(wanted[:-2], results):
+    for (name, _), result in zip(changes[:-2], results):
         assert result.successful or result.reason.startswith(f'{name} must')
     assert 'read-only parameter: leg.type' in results[-2].reason
     assert results[-1].reason.startswith('leg.pose cannot be removed; it must be a list of')
@@ -311,13 +311,13 @@ def test_messages_are_handled_between_requests_that_come_at_once(executor):
         assert client.set(('leg.scale', 0.5))[0].successful
         node.add_post_set_parameters_callback(lambda changed: handled.append(changed[0].value))
         # The last one is refused.
-        wanted = [1.0 + 0.01 * i for i in range(50)]
-        for value in [*wanted, -1.0]:
+        expected = [1.0 + 0.01 * i for i in range(50)]
+        for value in [*expected, -1.0]:
             client.services.set_parameters([_message('leg.scale', value)])
         crank.publish(JointState(name=['leg_crank']))
-        graph.until(lambda: wanted[-1] in handled and node.is_settled)
-    assert [value for value in handled if value is not None] == wanted
-    between = handled[handled.index(wanted[0]):handled.index(wanted[-1])]
+        graph.until(lambda: expected[-1] in handled and node.is_settled)
+    assert [value for value in handled if value is not None] == expected
+    between = handled[handled.index(expected[0]):handled.index(expected[-1])]
     # Jazzy's EventsExecutor awaits no service.
     if executor is SingleThreadedExecutor or not version('rclpy').startswith('7.'):
         assert between.count(None) > 10

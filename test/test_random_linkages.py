@@ -70,18 +70,18 @@ LISTED = {
 
 def problems(seeds, asked):
     """Return what does not hold for random linkages, with the seed of each."""
-    found = []
+    problems_ = []
     for seed in seeds:
         rng = np.random.default_rng(seed)
         told = checks.problems(random_linkages.design(rng), rng, asked(seed))
-        found += [(seed, *problem) for problem in (told[0] if told else ())]
-    return found
+        problems_ += [(seed, *problem) for problem in (told[0] if told else ())]
+    return problems_
 
 
-def report(found):
+def report(problems_):
     """Return problems as text: how many of each kind, and one of each."""
-    kinds = Counter(kind for _, kind, _ in found)
-    first = {kind: f'seed {seed}: {text}' for seed, kind, text in reversed(found)}
+    kinds = Counter(kind for _, kind, _ in problems_)
+    first = {kind: f'seed {seed}: {text}' for seed, kind, text in reversed(problems_)}
     return '\n'.join(f'{count} x {kind}, {first[kind]}' for kind, count in kinds.most_common())
 
 
@@ -97,23 +97,23 @@ def all_of_them(seed):
 
 
 def test_random_linkages_hold():
-    found = problems(range(4), a_few)
-    assert not found, report(found)
+    problems_ = problems(range(4), a_few)
+    assert not problems_, report(problems_)
 
 
 @pytest.mark.nightly
 @pytest.mark.parametrize('batch', range(LONG // BATCH))
 def test_a_thousand_random_linkages_hold(batch):
     first = 1000 + batch * BATCH
-    found = problems(range(first, first + BATCH), all_of_them)
-    assert not found, report(found)
+    problems_ = problems(range(first, first + BATCH), all_of_them)
+    assert not problems_, report(problems_)
 
 
 @pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('name', LISTED)
 def test_a_listed_linkage_holds_what_any_must(name):
-    found, _ = checks.problems(LISTED[name], np.random.default_rng(0))
-    assert not found, found[0]
+    problems_, _ = checks.problems(LISTED[name], np.random.default_rng(0))
+    assert not problems_, problems_[0]
 
 
 @pytest.mark.parametrize('kind', hard_cases.CATALOGUE)

@@ -66,14 +66,14 @@ def test_a_lever_has_an_answer_just_where_the_slot_cuts_the_circle_of_the_crank(
         lengths, angles = hard_cases.dimensions('slotted_lever', rng), rng.uniform(-4.0, 4.0, 40)
         lever = mechanisms.create('slotted_lever', branches={'L': half}, **lengths)
         gap = hard_cases.lever_gap(lengths, angles, half)
-        found, reductions = lever.servo(angles)
+        cranks, reductions = lever.servo(angles)
         clear = np.abs(gap) > 1e-9
-        assert (np.isfinite(found) == (gap > 0.0))[clear].all(), lever
+        assert (np.isfinite(cranks) == (gap > 0.0))[clear].all(), lever
         reached = linkage_checks.inside(lever.lever_reach(), angles, math.tau)
         assert (reached == (gap > 0.0))[clear].all(), lever
-        np.testing.assert_array_equal(lever.servo_angle(angles), found)
+        np.testing.assert_array_equal(lever.servo_angle(angles), cranks)
         steady = clear & (np.abs(gap) > 1e-3)
-        np.testing.assert_allclose(lever.reduction(found)[steady], reductions[steady], 1e-9)
+        np.testing.assert_allclose(lever.reduction(cranks)[steady], reductions[steady], 1e-9)
 
 
 @pytest.mark.parametrize('near, ends, answer', [

@@ -55,28 +55,28 @@ def test_one_robot_state_publisher_sees_all_loops_of_the_scene_closed(graph):
 
 
 def test_frames_of_another_robot_make_no_robot_of_the_scene(graph):
-    heard = graph.log()
+    texts = graph.log()
     graph.until(lambda: graph.node.count_publishers('/rosout'))
     graph.start(Kinematics, {**ROBOT, 'foot.only_named': False})
     whole = graph.listen(String, 'robot_description', LATCHED)
-    message = graph.until(lambda: [m.msg for m in heard if 'robot_description' in m.msg])[0]
+    message = graph.until(lambda: [m.msg for m in texts if 'robot_description' in m.msg])[0]
     assert 'frame_id must be the same for all' in message and 'torso, shin' in message
     assert not whole
 
 
 def test_whoever_comes_late_hears_the_description_once(graph):
     node = graph.start(Kinematics, {'mechanisms': ['jansen'], 'frame_id': 'base'})
-    heard, whole = (graph.listen(String, topic, LATCHED)
-                    for topic in ('jansen/robot_description', 'robot_description'))
-    robot = ElementTree.fromstring(graph.until(lambda: heard and whole and heard)[0].data)
+    messages, whole = (graph.listen(String, topic, LATCHED)
+                       for topic in ('jansen/robot_description', 'robot_description'))
+    robot = ElementTree.fromstring(graph.until(lambda: messages and whole and messages)[0].data)
     assert robot.get('name') == 'jansen' and robot.find('link').get('name') == 'base'
     crank = graph.crank(['jansen_crank'])
     crank([0.5], graph.listen(JointState, 'jansen/joint_states'))
     assert graph.set(node, jansen__points=['G']).successful
     assert graph.set(node, jansen__pose=[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]).successful
-    graph.until(lambda: len(heard) > 1 < len(whole))
-    assert len(heard) == len(whole) == 2
-    assert all('xyz="1.0 0.0 0.0"' in texts[1].data for texts in (heard, whole))
+    graph.until(lambda: len(messages) > 1 < len(whole))
+    assert len(messages) == len(whole) == 2
+    assert all('xyz="1.0 0.0 0.0"' in texts[1].data for texts in (messages, whole))
 
     def publishers():
         return [str(info.endpoint_gid)

@@ -95,7 +95,7 @@ def test_published_joints_close_the_loops_of_a_file(file, library):
                           for motor, (low, high) in motors.items()}
         for mechanism in found:
             joints.update(published(mechanism, **{
-                drive.source: at[drive.source] for drive in mechanism.inputs.values()}))
+                settings.source: at[settings.source] for settings in mechanism.inputs.values()}))
         check_closed(robot, joints, loops)
     rest, lost = cli.others(read, {mechanism.name: mechanism for mechanism in found}, {})
     rest = scene.read({**rest, 'mechanisms': ['others']}).mechanisms if rest else {}
@@ -129,14 +129,15 @@ LIMITS = [
 def test_limits_of_a_motor_become_a_sweep_or_a_sentence(tmp_path, file, old, new, ends, why):
     path = of_text(tmp_path / file, (ROBOTS / file).read_text().replace(old, new, 1))
     mechanism, = imported(path)
-    drive = mechanism.first
-    assert (f' Left out: the limits of {drive.source}, {why}.\n' in said(path)) == bool(why)
-    assert sweep(drive) == (ends and pytest.approx(ends, abs=1e-5))
+    settings = mechanism.first
+    assert (f' Left out: the limits of {settings.source}, {why}.\n' in said(path)) == bool(why)
+    assert sweep(settings) == (ends and pytest.approx(ends, abs=1e-5))
 
 
-def sweep(drive):
+def sweep(settings):
     """Return the ends of a sweep as positions of its source, None without one."""
-    return drive.ends and sorted((end - drive.offset) / drive.ratio for end in drive.ends)
+    offset, ratio = settings.offset, settings.ratio
+    return settings.ends and sorted((end - offset) / ratio for end in settings.ends)
 
 
 def mimicking(tmp_path, *servos, more=''):
@@ -168,8 +169,8 @@ SERVO = '<transmission name="t"><joint name="servo"/></transmission>'
 def test_limits_of_a_joint_are_those_of_all_that_it_follows(tmp_path, servos, ends, more):
     file = mimicking(tmp_path, *servos, more=more)
     mechanism, = imported(file)
-    drive = mechanism.first
-    assert drive.source == 'servo' and sweep(drive) == (ends and pytest.approx(ends))
+    settings = mechanism.first
+    assert settings.source == 'servo' and sweep(settings) == (ends and pytest.approx(ends))
     assert (f'poses of the robot, servo from {ends[0]:.4g} to {ends[1]:.4g}, ' if ends else
             f'the limits of servo, from 5 to 2.6: {BEYOND}') in said(file)
 
@@ -190,9 +191,9 @@ def test_limits_of_all_joints_that_follow_a_motor_bound_it(tmp_path):
     # Also those of a passive joint.
     mechanism, = imported(written(tmp_path, 'four_bar.urdf', (
         axis, f'<mimic joint="motor" multiplier="-1"/>{axis}')))
-    drive = mechanism.first
-    assert (drive.source, drive.ratio) == ('motor', -1.0)
-    assert sweep(drive) == pytest.approx([-1.2, 1.2])
+    settings = mechanism.first
+    assert (settings.source, settings.ratio) == ('motor', -1.0)
+    assert sweep(settings) == pytest.approx([-1.2, 1.2])
     # What is read is not published, too.
     assert published(mechanism, motor=0.4) == pytest.approx({'motor': 0.4, 'elbow': -0.4})
     assert {called.name for called in mechanism.joints.values() if called.published} == {'elbow'}
@@ -218,39 +219,39 @@ def four_bar():
     return robot, cli.described(robot)[0]
 
 
-def compared(robot, given, *motors):
+def compared(robot, parameters, *motors):
     """Return the report on mechanisms of a scene that motors drive, or how one differs."""
-    mechanisms = scene.read(given).mechanisms
+    mechanisms = scene.read(parameters).mechanisms
     reports, wrong = check.compared(robot, mechanisms, [
         check.Imported(name, {}, [], motors) for name in mechanisms])
     return ' '.join([*reports, *wrong.values()])
 
 
-def differing(robot, given, name, old, new, *motors):
+def differing(robot, parameters, name, old, new, *motors):
     """Return how a scene differs from its robot if its lines are others; as it is, it does not."""
-    assert compared(robot, given, *motors).startswith('Checked: ')
+    assert compared(robot, parameters, *motors).startswith('Checked: ')
     key = f'{name}.joint_names' if '=' in old else f'{name}.joints'
-    changed = [line.replace(old, new) for line in given[key]]
-    assert changed != given[key]
-    return compared(robot, {**given, key: changed}, *motors)
+    changed = [line.replace(old, new) for line in parameters[key]]
+    assert changed != parameters[key]
+    return compared(robot, {**parameters, key: changed}, *motors)
 
 
 def test_a_source_of_several_mechanisms_is_checked_where_all_of_them_move(four_bar):
-    robot, given = four_bar
-    zero = given['motor.crank.offset']
-    given.update({key.replace('motor.', 'twin.', 1): value for key, value in given.items()})
-    given.update({'mechanisms': ['motor', 'twin'], 'twin.joint_names': ['CD=a', 'BD=b'], **{
+    robot, parameters = four_bar
+    zero = parameters['motor.crank.offset']
+    parameters.update([(key.replace('motor.', 'twin.', 1), parameters[key]) for key in parameters])
+    parameters.update({'mechanisms': ['motor', 'twin'], 'twin.joint_names': ['CD=a', 'BD=b'], **{
         f'{name}.crank.sweep': [zero + low, zero + high]
         for name, low, high in (('motor', -1.0, 0.5), ('twin', -0.5, 1.0))}})
     assert 'motor, twin: in 240 poses of the robot, motor from -0.5 to 0.5, ' in compared(
-        robot, given, 'motor')
+        robot, parameters, 'motor')
 
 
 def test_a_mechanism_that_cannot_move_is_not_checked(four_bar):
-    robot, given = four_bar
-    zero = given['motor.crank.start']
-    given['motor.crank.sweep'] = [zero, zero + 1e-10]
-    assert compared(robot, given, 'motor') == 'it could not be checked in more than 0 poses'
+    robot, parameters = four_bar
+    zero = parameters['motor.crank.start']
+    parameters['motor.crank.sweep'] = [zero, zero + 1e-10]
+    assert compared(robot, parameters, 'motor') == 'it could not be checked in more than 0 poses'
 
 
 def checked(text):
@@ -350,7 +351,7 @@ def test_a_five_bar_is_closed_by_what_moves_it(tmp_path, more, mimic, motors):
     axis, loops = '<axis xyz="0 -1 0"/>', loops_of(tmp_path, more)
     file = written(tmp_path, 'five_bar.urdf', (axis, axis + mimic))
     mechanism, = imported(file, *loops)
-    assert {drive.source for drive in mechanism.inputs.values()} == {
+    assert {settings.source for settings in mechanism.inputs.values()} == {
         *re.search(r'name_mot: \[(.*)\]', more)[1].split(', ')}
     robot = Pinocchio((ROBOTS / 'five_bar.urdf').read_text())
     for angle in np.linspace(-0.3, 0.3, 7):
@@ -627,9 +628,9 @@ def test_a_motor_between_two_moving_links_drives_in_the_frame_of_one(tmp_path, l
         '"elbow" type="continuous">', f'"elbow" type="revolute"><limit lower="{low}" upper="0.8"/>'
     ))
     mechanism, = imported(file, '--driven', 'elbow')
-    drive = mechanism.first
-    assert (drive.source, mechanism.frame_id, drive.start) == ('elbow', 'crank', 0.0)
-    assert drive.ends == pytest.approx((low, 0.8))
+    settings = mechanism.first
+    assert (settings.source, mechanism.frame_id, settings.start) == ('elbow', 'crank', 0.0)
+    assert settings.ends == pytest.approx((low, 0.8))
     for angle in (-0.8, 0.3, 1.1):
         assert published(mechanism, elbow=angle) == pytest.approx(
             {'elbow': angle, 'motor': -angle, 'shoulder': angle}, abs=1e-9)
@@ -638,13 +639,13 @@ def test_a_motor_between_two_moving_links_drives_in_the_frame_of_one(tmp_path, l
 def test_a_joint_of_the_whole_robot_that_opens_a_loop_is_named(monkeypatch):
     # As if a passive joint were an input.
     robot = closing.closed(readers.read(str(ROBOTS / 'wheel_leg.urdf'))).robot
-    given, _, _ = cli.described(robot)
-    names = [line for line in given['hip.joint_names'] if 'bell' not in line]
-    mechanisms = scene.read({**given, 'hip.joint_names': names}).mechanisms
+    parameters, _, _ = cli.described(robot)
+    names = [line for line in parameters['hip.joint_names'] if 'bell' not in line]
+    mechanisms = scene.read({**parameters, 'hip.joint_names': names}).mechanisms
     rest, lost = cli.others(robot, mechanisms, {})
     assert lost == ['bell_joint'] and not rest
     still, _ = cli.others(robot, mechanisms, {'bell_joint': 0.0})
-    wrong = scene.read({**given, **still, 'hip.joint_names': names,
+    wrong = scene.read({**parameters, **still, 'hip.joint_names': names,
                         'mechanisms': ['hip', 'others']}).mechanisms
     made = [check.Imported('hip', {}, [], ['hip', 'crank_motor'])]
     assert not check.compared(robot, mechanisms, made)[1]
@@ -743,7 +744,7 @@ def moves(linkage, values, robot, steps, lean=0.0, before_names=''):
     with something before them.
     """
     try:
-        given, said, _ = cli.described(robot)
+        parameters, said, _ = cli.described(robot)
     except RequestError as error:
         assert re.search('closes a loop|not of dyads|it cannot move|lie in line|loops end',
                          str(error))
@@ -751,15 +752,15 @@ def moves(linkage, values, robot, steps, lean=0.0, before_names=''):
         return False
     assert all(count >= 200 and worst < 1e-6 + 100.0 * lean
                for count, worst in checked('\n'.join(said)))
-    mechanisms = scene.read(given).mechanisms.values()
+    mechanisms = scene.read(parameters).mechanisms.values()
     before, starts, moved = linkage.joint_angles(values), robot.positions, False
     for step in steps:
         after = linkage.joint_angles(theta_of(np.ravel(values) + step))
         named = zip([before_names + each.name for each in linkage.inputs], step)
         motors, found = {name: starts[name] + by for name, by in named}, {}
         for mechanism in mechanisms:
-            found.update(published(mechanism, **{drive.source: motors[drive.source]
-                                                 for drive in mechanism.inputs.values()}))
+            found.update(published(mechanism, **{settings.source: motors[settings.source]
+                                                 for settings in mechanism.inputs.values()}))
         for link in linkage.links:
             name = before_names + link.name
             if name in found and name not in motors:

@@ -18,7 +18,7 @@ import pytest
 from robots import turned
 from scenes import alone
 from test_simulators import model, simulated, some_quick
-from test_urdf import ARM, in_space, MACHINES, OWN, posed
+from test_urdf import ARM, FROM_CASES, in_space, joints_and_places, MECHANISMS
 
 QUICK = ('jansen', 'slotted_lever', 'engine with zeros elsewhere', 'five_bar',
          'boom and arm', 'Scotch yoke', 'Cardan gears', 'scissor lift', 'five-bar with a gear')
@@ -77,24 +77,25 @@ def visuals(text, frames):
         for link in (*root.iter('link'), *root.iter('body')) if link.get('name') in frames}
 
 
-def scene_seen(one, thetas, width):
+def scene_seen(mechanism, thetas, width):
     """Return what is seen of the links of a scene but balls."""
-    _, places = posed(one, thetas)
-    found, shown = {}, shapes(one)
-    ends = one.assembly().solution([end for shape in shown for end in (shape.start, shape.end)])
+    _, places = joints_and_places(mechanism, thetas)
+    visuals_, shown = {}, shapes(mechanism)
+    ends = mechanism.assembly().solution([
+        end for shape in shown for end in (shape.start, shape.end)])
     ends.solve(thetas.tolist())
 
     def add(link, *visual):
-        found.setdefault(f'm_{link}_link', []).append(row(*visual))
+        visuals_.setdefault(f'm_{link}_link', []).append(row(*visual))
 
     def colour(link):
-        return ORANGE if link in one.inputs else BLUE
+        return ORANGE if link in mechanism.inputs else BLUE
 
-    for prefix, leg_ends in zip(one.assembly().legs, ends.rows):
-        spots = {name[len(f'm_{prefix}'):]: in_space(one.pose, place)
+    for prefix, leg_ends in zip(mechanism.assembly().legs, ends.rows):
+        spots = {name[len(f'm_{prefix}'):]: in_space(mechanism.pose, place)
                  for name, place in places.items() if name.startswith(f'm_{prefix}')}
-        for link, frame in one.linkage.frames.items():
-            for start, end in one.linkage.bars:
+        for link, frame in mechanism.linkage.frames.items():
+            for start, end in mechanism.linkage.bars:
                 if {start, end} <= set(frame):
                     add(prefix + link, 'cylinder', colour(link), width / 2, spots[start],
                         spots[end])
@@ -103,24 +104,24 @@ def scene_seen(one, thetas, width):
             look = {GUIDE: ('box', GREY, width / 2), BLOCK: ('box', colour(slide), 2.0 * width),
                     BARREL: ('cylinder', colour(slide), 1.25 * width),
                     ROD: ('cylinder', BLUE, width / 2)}[shape.kind]
-            drawn = (*look, in_space(one.pose, start), in_space(one.pose, end))
-            if link != 'ground' or row(*drawn) not in found.get('m_ground_link', []):
+            drawn = (*look, in_space(mechanism.pose, start), in_space(mechanism.pose, end))
+            if link != 'ground' or row(*drawn) not in visuals_.get('m_ground_link', []):
                 add(link if link == 'ground' else prefix + link, *drawn)
-    return found
+    return visuals_
 
 
-@pytest.mark.parametrize('name', some_quick([*MACHINES, *OWN], QUICK))
+@pytest.mark.parametrize('name', some_quick([*MECHANISMS, *FROM_CASES], QUICK))
 def test_three_formats_show_what_the_scene_has(name):
     # That their links and joints are those of the model is held where they are read again.
-    one = simulated(name)
+    mechanism = simulated(name)
     width = WIDTHS.get(name)
-    robot = bodies.robot([one], 'world', width)
-    built = bodies.robot([one], 'world', width, DENSITY)
-    width = width or bodies.size(one) / 40
-    starts = np.array([np.clip(drive.start, *drive.sweep or (-math.inf, math.inf))
-                       for drive in one.inputs.values()])
-    places = posed(one, starts)[1]
-    frames = {body: turned(*one.pose) @ frame for body, frame in built.frames.items()
+    robot = bodies.robot([mechanism], 'world', width)
+    built = bodies.robot([mechanism], 'world', width, DENSITY)
+    width = width or bodies.size(mechanism) / 40
+    starts = np.array([np.clip(settings.start, *settings.sweep or (-math.inf, math.inf))
+                       for settings in mechanism.inputs.values()])
+    places = joints_and_places(mechanism, starts)[1]
+    frames = {body: turned(*mechanism.pose) @ frame for body, frame in built.frames.items()
               if body != 'world'}
     texts = urdf.write(robot), mjcf.write(built), sdf.write(built)
     # People read it: a line for each element.
@@ -129,12 +130,12 @@ def test_three_formats_show_what_the_scene_has(name):
     # A body of which nothing else is seen, such as a point, is a ball.
     balls = {name: [row('sphere', GREY, width, frame[:3, 3], frame[:3, 3])]
              for name, frame in frames.items() if name != 'm_ground_link'}
-    wanted = {**balls, **scene_seen(one, starts, width)}
-    for found in tree, loops, gazebo:
-        there = {name: rows for name, rows in wanted.items() if rows and name in found}
-        assert {name for name, rows in found.items() if rows} == there.keys()
+    expected = {**balls, **scene_seen(mechanism, starts, width)}
+    for shown in tree, loops, gazebo:
+        there = {name: rows for name, rows in expected.items() if rows and name in shown}
+        assert {name for name, rows in shown.items() if rows} == there.keys()
         for name, rows in there.items():
-            assert np.array(sorted(found[name])) == pytest.approx(np.array(sorted(rows)), abs=1e-6)
+            assert np.array(sorted(shown[name])) == pytest.approx(np.array(sorted(rows)), abs=1e-6)
     # Bodies in the slots of yokes are of simulators alone.
     assert tree.keys() == robot.frames.keys() - {'world'} and frames.keys() == loops.keys()
     assert frames.keys() == gazebo.keys()
@@ -144,51 +145,51 @@ def test_three_formats_show_what_the_scene_has(name):
     masses = {link.get('name'): float(link.findtext('inertial/mass'))
               for link in root.iter('link') if link.find('inertial') is not None}
     assert masses.keys() == {name for name in gazebo if gazebo[name]}
-    check_mjcf(one, simulator, starts, places, 9.81 * sum(masses.values()))
+    check_mjcf(mechanism, simulator, starts, places, 9.81 * sum(masses.values()))
 
 
-def check_mjcf(one, root, starts, places, weight):
+def check_mjcf(mechanism, root, starts, places, weight):
     """Check an MJCF's servos and their keyframe."""
-    size, links = bodies.size(one), {link.name: link for link in one.linkage.links}
-    leg, published = f'm_{next(iter(one.assembly().legs))}', [one.joints[k] for k in one.inputs]
+    size, links = bodies.size(mechanism), {link.name: link for link in mechanism.linkage.links}
+    leg = f'm_{next(iter(mechanism.assembly().legs))}'
+    published = [mechanism.joints[name] for name in mechanism.inputs]
     assert numbers(root.find('keyframe')[0].get('ctrl')) == pytest.approx(
         [joint.of(start) for joint, start in zip(published, starts)])
     # A servo gives way by a thousandth [rad, or of the longest bar], and pulls ten times as much.
-    for servo, joint, (name, drive) in zip(
-            root.find('actuator'), published, one.inputs.items(), strict=True):
+    for servo, joint, (name, driven) in zip(
+            root.find('actuator'), published, mechanism.inputs.items(), strict=True):
         arm = math.dist(*(places[leg + point] for point in (links[name].joint, links[name].tip))
-                        ) if drive.input.is_angle else size
-        force, way = (weight * arm, 1e-3) if drive.input.is_angle else (weight, 1e-3 * arm)
+                        ) if driven.input.is_angle else size
+        force, way = (weight * arm, 1e-3) if driven.input.is_angle else (weight, 1e-3 * arm)
         assert (servo.tag, servo.get('joint')) == ('position', joint.name)
         assert float(servo.get('kp')) == pytest.approx(force / way)
         assert numbers(servo.get('forcerange')) == pytest.approx([-10.0 * force, 10.0 * force])
         assert numbers(servo.get('ctrlrange')) == pytest.approx(
-            sorted(map(joint.of, drive.sweep or ())))
+            sorted(map(joint.of, driven.sweep or ())))
 
 
 @pytest.mark.parametrize('name', ['five-bar with a gear', 'Cardan gears'])
 def test_geared_joints_follow_as_they_are_published(name):
-    one = simulated(name)
-    given = {each.name: each.value for each in one.parameters if each.value != ()}
-    # With the signs turned of those that are geared.
-    one = scene.read({'mechanisms': ['m'], **given, 'm.joint_names': [
-        f'{leg}{geared}=-back_{leg}{geared}' for leg in one.assembly().legs
-        for geared in one.linkage.geared]}).mechanisms['m']
-    follows = model([one]).follows
-    assert len(follows) == len(one.linkage.geared) * len(one.assembly().legs)
-    for thetas in np.random.default_rng(1).uniform(-3.0, 3.0, (4, len(one.inputs))):
-        found, _ = posed(one, thetas)
+    mechanism = simulated(name)
+    parameters = {each.name: each.value for each in mechanism.parameters if each.value != ()}
+    # With the signs turned of all but one of the cranks.
+    mechanism = scene.read({'mechanisms': ['m'], **parameters, 'm.joint_names': [
+        f'{key}=-back_{key}' for key in mechanism.joints if key != 'crank2']}).mechanisms['m']
+    follows = model([mechanism]).follows
+    assert len(follows) == len(mechanism.linkage.geared) * len(mechanism.assembly().legs)
+    for thetas in np.random.default_rng(1).uniform(-3.0, 3.0, (4, len(mechanism.inputs))):
+        positions, _ = joints_and_places(mechanism, thetas)
         for geared, (driving, ratio, offset) in follows.items():
-            assert math.remainder(ratio * found[driving] + offset - found[geared], math.tau
+            assert math.remainder(ratio * positions[driving] + offset - positions[geared], math.tau
                                   ) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_gazebo_has_a_plugin_for_each_cut_and_each_motor():
     root, = ElementTree.fromstring(sdf.write(model([simulated('five_bar')])))
-    found = [(plugin.get('filename'), plugin.get('name').rpartition('::')[2],
-              {part.tag: part.text for part in plugin}) for plugin in root.findall('plugin')]
+    plugins = [(plugin.get('filename'), plugin.get('name').rpartition('::')[2],
+                {part.tag: part.text for part in plugin}) for plugin in root.findall('plugin')]
     controller = ('gz-sim-joint-position-controller-system', 'JointPositionController')
-    assert root.get('name') == 'm' and found == [
+    assert root.get('name') == 'm' and plugins == [
         ('gz-sim-detachable-joint-system', 'DetachableJoint', {
             'parent_link': 'm_AP_link', 'child_model': '__model__', 'child_link': 'm_P_cut'}),
         ('gz-sim-joint-state-publisher-system', 'JointStatePublisher', {}),
@@ -204,7 +205,7 @@ BASES = ('frame_id must be the same for all mechanisms of one robot model, or a 
 LONG = 'm.scale and m.dimensions must make the longest bar from 1e-30 to 1e+30 m long, not {}'
 
 
-@pytest.mark.parametrize('given, complaint', [
+@pytest.mark.parametrize('parameters, complaint', [
     ({'m.type': 'custom', 'm.joints': [line.format('0.9e30') for line in YOKE]}, ''),
     ({'m.type': 'custom', 'm.joints': [line.format('1.1e30') for line in YOKE]},
      LONG.format('1.1e+30')),
@@ -223,11 +224,11 @@ LONG = 'm.scale and m.dimensions must make the longest bar from 1e-30 to 1e+30 m
     ({**ARM, 'mechanisms': ['m', 'hand', 'arm'], 'm.type': 'four_bar',
       'hand.frame_id': 'arm_B', 'arm.frame_id': 'hand_B'},
      BASES.format('world, arm_B, hand_B'))])
-def test_what_makes_no_model_is_refused(given, complaint):
-    one = {'mechanisms': ['m'], 'm.type': 'four_bar'}
-    found = scene.read({**(one if 'mechanisms' not in given else {}), **given})
+def test_what_makes_no_model_is_refused(parameters, complaint):
+    mechanism = {'mechanisms': ['m'], 'm.type': 'four_bar'}
+    scene_ = scene.read({**(mechanism if 'mechanisms' not in parameters else {}), **parameters})
     try:
-        urdf.describe(found.mechanisms.values(), found.frame_id)
+        urdf.describe(scene_.mechanisms.values(), scene_.frame_id)
         assert not complaint
     except scene.SceneError as error:
         assert str(error) == complaint
@@ -243,8 +244,8 @@ def test_a_linkage_in_space_makes_no_model():
 def test_what_has_no_length_is_not_drawn():
     # At its shortest the cylinder has no length, and so has its barrel.
     lines = ['P ground 0 0', 'O ground 1 0', 'B cylinder P O 1 right']
-    one = alone(lines, cylinder__start=1.0)
-    pieces = [piece for pieces in model([one]).pieces.values() for piece in pieces]
+    mechanism = alone(lines, cylinder__start=1.0)
+    pieces = [piece for pieces in model([mechanism]).pieces.values() for piece in pieces]
     assert {(piece.shape, piece.length > 0.0) for piece in pieces} == {
         ('sphere', False), ('cylinder', True)}
 
@@ -255,10 +256,10 @@ def test_what_has_no_length_is_not_drawn():
                 | st.floats(-7.0, 7.0), min_size=3, max_size=3))
 def test_coordinates_of_a_pose_give_the_pose(place, angles):
     pose = turned(*place, *angles)
-    found = robot.coordinates(pose)
-    assert turned(*found) == pytest.approx(pose, abs=1e-8)
+    coordinates = robot.coordinates(pose)
+    assert turned(*coordinates) == pytest.approx(pose, abs=1e-8)
     assert robot.pose(*place, *angles) == pytest.approx(pose, abs=1e-12)
-    assert all(map(math.isfinite, found)) and abs(found[4]) <= 0.5 * math.pi + 1e-12
+    assert all(map(math.isfinite, coordinates)) and abs(coordinates[4]) <= 0.5 * math.pi + 1e-12
 
 
 def test_the_command_prints_what_its_options_ask_for(tmp_path, capsys):
@@ -312,7 +313,7 @@ RVIZ = {'Visualization Manager': {
 def test_rviz_s_camera_sees_all_of_a_scene_square_to_the_first_plane(angles, pitch, yaw):
     mechanisms = scene.read({
         'mechanisms': ['m', 'n'], 'm.type': 'jansen', 'm.pose': [1.0, 2.0, 3.0, *angles],
-        'n.type': 'slider_crank', 'm.scale': 0.01, 'm.leg_pairs': 2, 'n.scale': 0.01,
+        'n.type': 'slider_crank', 'm.scale': 0.01, 'm.mirrored': True, 'n.scale': 0.01,
         'n.pose': [-1.0, 0.5, 0.0, 0.3, 0.2, 0.1], 'n.crank.sweep': [0.5, 2.0]}).mechanisms
     before = copy.deepcopy(RVIZ)
     manager = rviz.adapted(RVIZ, mechanisms, 'base')['Visualization Manager']
@@ -322,14 +323,14 @@ def test_rviz_s_camera_sees_all_of_a_scene_square_to_the_first_plane(angles, pit
             {'Class': 'rviz_default_plugins/MarkerArray', 'Topic': {'Value': f'/{name}/markers'}}]}
         for name in mechanisms), {'Class': 'Axes'}]
     view, places = manager['Views']['Current'], []
-    for one in mechanisms.values():
-        ends = one.first.ends or (0.0, math.tau)
-        solution = one.assembly().solution(one.linkage.points)
+    for mechanism in mechanisms.values():
+        ends = mechanism.first.ends or (0.0, math.tau)
+        solution = mechanism.assembly().solution(mechanism.linkage.points)
         for theta in np.linspace(*ends, 51):
             solution.solve([theta])
             # A mirrored walker is shown with both of its sides in all poses.
-            for side in (1.0, -1.0)[:1 + one.mirrored]:
-                places += [*in_space(one.pose, solution.rows.reshape(-1, 2) * (side, 1.0))]
+            for side in (1.0, -1.0)[:1 + mechanism.mirrored]:
+                places += [*in_space(mechanism.pose, solution.rows.reshape(-1, 2) * (side, 1.0))]
     low, high = np.min(places, axis=0), np.max(places, axis=0)
     focus, radius = (low + high) / 2, math.dist(low, high) / 2
     assert [view['Focal Point'][axis] for axis in 'XYZ'] == pytest.approx(focus, abs=0.02 * radius)

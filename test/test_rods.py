@@ -65,8 +65,8 @@ def test_a_rod_on_a_hinge_is_right_to_the_last_digits(seed, count):
 
 def offers(error):
     """Return the window [rad] that a refusal says to paste; None if it says none."""
-    found = re.findall(r'within (\S+)deg (\S+)deg(?=[,;]|$)', str(error))
-    return np.array(found, float).T * DEGREE if found else None
+    limits = re.findall(r'within (\S+)deg (\S+)deg(?=[,;]|$)', str(error))
+    return np.array(limits, float).T * DEGREE if limits else None
 
 
 def offered(lines):
@@ -93,8 +93,8 @@ def driven(ankle, window):
     inverse = linkage.driven_by('pitch', 'roll')
 
     def motors(poses):
-        found = inverse.joint_angles(poses, ['l', 'r'])
-        return np.stack([found['l'], found['r']])
+        angles = inverse.joint_angles(poses, ['l', 'r'])
+        return np.stack([angles['l'], angles['r']])
     return linkage, motors
 
 
@@ -106,18 +106,18 @@ def pose(linkage, motors):
 def check_ankle(ankle, window, rng, poses, exact):
     """Hold an ankle to the rule: no pose missed, none but the right one."""
     linkage, motors = driven(ankle, window)
-    wanted = rng.uniform(*window, (poses, 2)).T
+    expected = rng.uniform(*window, (poses, 2)).T
     # The edges of the window belong to it.
-    wanted[0, ::10], wanted[1, 5::10] = window[1][0], window[0][1]
-    inputs = motors(wanted)
+    expected[0, ::10], expected[1, 5::10] = window[1][0], window[0][1]
+    inputs = motors(expected)
     reached = ~np.isnan(inputs).any(axis=0)
-    found = pose(linkage, inputs)
-    np.testing.assert_allclose(found[:, reached], wanted[:, reached], atol=1e-11)
-    assert np.isnan(found[:, ~reached]).all()
+    angles = pose(linkage, inputs)
+    np.testing.assert_allclose(angles[:, reached], expected[:, reached], atol=1e-11)
+    assert np.isnan(angles[:, ~reached]).all()
     with rods.exactly():
         for i in rng.choice(np.flatnonzero(reached), exact):
-            errors, sensitivity = rods.pose_error(ankle, inputs[:, i], *found[:, i])
-            for error, given, value in zip(errors, sensitivity, found[:, i]):
+            errors, sensitivity = rods.pose_error(ankle, inputs[:, i], *angles[:, i])
+            for error, given, value in zip(errors, sensitivity, angles[:, i]):
                 assert error <= RULE * given + np.spacing(abs(value))
 
 
@@ -148,7 +148,7 @@ def check_assemblies(ankle, window, rng, count):
     inputs = rng.uniform(-math.pi, math.pi, (2, count))
     if ankle.motor_axes[0] is None:
         inputs = motors(rng.uniform(*window, (count, 2)).T) * rng.uniform(0.8, 1.2, (2, count))
-    found = pose(linkage, inputs)
+    angles = pose(linkage, inputs)
     all_ = np.stack(rods.assemblies(ankle, inputs), axis=-1)
     inside = ((all_ > window[0]) & (all_ < window[1])).all(axis=-1)
     # Where a root is on the edge but for the rounding of the judge either will do.
@@ -156,18 +156,18 @@ def check_assemblies(ankle, window, rng, count):
     inside &= rods.are_drawn(ankle, inputs[..., None], all_[..., 0], all_[..., 1])
     clear = ~edge.any(axis=1)
     assert inside.sum(axis=1).max() <= 1
-    assert (np.isnan(found[0]) == ~inside.any(axis=1))[clear].all()
+    assert (np.isnan(angles[0]) == ~inside.any(axis=1))[clear].all()
     there = inside.any(axis=1) & clear
     right = all_[there][inside[there]]
-    np.testing.assert_allclose(found[:, there].T, right, atol=1e-5)
+    np.testing.assert_allclose(angles[:, there].T, right, atol=1e-5)
     return there.sum()
 
 
 @pytest.mark.parametrize('seed, count, poses', [(3, 2, 500), (2000, 5, 10000)])
 @pytest.mark.nightly
 def test_no_pose_is_of_another_assembly(seed, count, poses):
-    found = [check_assemblies(*each, poses) for each in ankles(seed, count)]
-    assert sum(found) > 0.02 * count * poses
+    counts = [check_assemblies(*each, poses) for each in ankles(seed, count)]
+    assert sum(counts) > 0.02 * count * poses
 
 
 @pytest.mark.nightly(all_but=2)
@@ -179,8 +179,8 @@ def test_the_ranges_of_real_ankles_are_proved_whatever_their_signs(robot, turned
     ankle = rods.drawn(*(np.multiply(part, turned) if i in (1, 3) else part
                          for i, part in enumerate(parts)))
     window = np.sort(np.multiply(window, turned), axis=0)
-    found = check_assemblies(ankle, window, np.random.default_rng(1), 400)
-    assert found > 3
+    count = check_assemblies(ankle, window, np.random.default_rng(1), 400)
+    assert count > 3
 
 
 @pytest.mark.parametrize('seed, count', [
@@ -270,9 +270,9 @@ def g1():
 def test_a_pose_is_that_of_the_motors_alone(g1):
     motors = np.random.default_rng(6).uniform(-1.0, 1.0, (2, 500))
     alone = np.array([g1.function((), ('pitch', 'roll'))(*each) for each in motors.T.tolist()]).T
-    found = pose(g1, motors)
-    np.testing.assert_allclose(found, alone, atol=1e-15)
-    np.testing.assert_allclose(pose(g1, motors + 2.0 * math.pi), found, atol=1e-13)
+    angles = pose(g1, motors)
+    np.testing.assert_allclose(angles, alone, atol=1e-15)
+    np.testing.assert_allclose(pose(g1, motors + 2.0 * math.pi), angles, atol=1e-13)
 
 
 def test_machine_code_finds_the_same_poses(g1):
@@ -282,13 +282,13 @@ def test_machine_code_finds_the_same_poses(g1):
 
 
 def test_the_motors_of_a_pose_are_those_on_the_drawn_sides(g1):
-    folded, wanted = made(G1, branches={'R': -1}), (-0.1, 0.05)
+    folded, expected = made(G1, branches={'R': -1}), (-0.1, 0.05)
     for linkage, other in ((g1, folded), (folded, g1)):
-        answer, = linkage.inputs_for(('pitch', 'roll'), wanted)
-        np.testing.assert_allclose(pose(linkage, answer.inputs), wanted, atol=1e-14)
+        answer, = linkage.inputs_for(('pitch', 'roll'), expected)
+        np.testing.assert_allclose(pose(linkage, answer.inputs), expected, atol=1e-14)
         # A branch has its crank on the other side, and no pose in common.
         assert np.isnan(pose(other, answer.inputs)).all()
-        drawn = linkage.driven_by('pitch', 'roll').joint_angles(wanted, ('right', 'left'))
+        drawn = linkage.driven_by('pitch', 'roll').joint_angles(expected, ('right', 'left'))
         assert np.allclose(answer.inputs, list(drawn.values()), atol=1e-15)
         assert linkage.inputs_for(('pitch', 'roll'), (1.0, 0.05)) == []
 

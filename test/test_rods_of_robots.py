@@ -43,14 +43,14 @@ def mjcf(ankle, limits, pins=None, ref=0.0):
               for low, high in (np.transpose(limits).tolist() if limits is not None
                                 else ((0, 0), (0, 0)))]
     ties = ''.join(f'<connect site1="eye {i}" site2="pin {i}"/>' for i in (0, 1))
-    drives = ''.join(f'<motor joint="{name}"/>' for name in 'lr')
+    motors = ''.join(f'<motor joint="{name}"/>' for name in 'lr')
     return (
         '<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="shin">'
         f'{LIGHT}<joint name="knee" axis="0 1 0"/><body name="cross" pos="{text(ankle.first)}">'
         f'<joint name="pitch" axis="{text(ankle.first_axis)}" {ranges[0]}/>{LIGHT}'
         f'<body name="foot" pos="{less(ankle.second, ankle.first)}"><joint name="roll" '
         f'axis="{text(ankle.second_axis)}" {ranges[1]}/>{LIGHT}{eyes}</body></body>{legs}</body>'
-        f'</worldbody><equality>{ties}</equality><actuator>{drives}</actuator></mujoco>')
+        f'</worldbody><equality>{ties}</equality><actuator>{motors}</actuator></mujoco>')
 
 
 def turning(seed):
@@ -67,10 +67,10 @@ def check_rods(ankle, mechanism):
     assert {called.name for called in mechanism.joints.values() if called.published} == {
         'pitch', 'roll'}
     motors = np.random.default_rng(3).uniform(-0.1, 0.1, (2, 40))
-    found = np.stack(list(mechanism.linkage.joint_angles(motors, ['pitch', 'roll']).values()))
-    there = np.isfinite(found[0])
+    angles = np.stack(list(mechanism.linkage.joint_angles(motors, ['pitch', 'roll']).values()))
+    there = np.isfinite(angles[0])
     assert there.sum() > 10
-    assert np.abs(np.array(rods.gaps(ankle, motors, *found))[:, there]).max() < 1e-15
+    assert np.abs(np.array(rods.gaps(ankle, motors, *angles))[:, there]).max() < 1e-15
 
 
 def test_an_ankle_is_imported_with_the_limits_of_its_file(tmp_path):
@@ -80,7 +80,7 @@ def test_an_ankle_is_imported_with_the_limits_of_its_file(tmp_path):
     assert 'in 240 poses of the robot' in err and 'Limits' not in err
     mechanism, = imported(file)
     assert mechanism.frame_id == 'shin'
-    assert {drive.source for drive in mechanism.inputs.values()} == {'l', 'r'}
+    assert {settings.source for settings in mechanism.inputs.values()} == {'l', 'r'}
     assert re.findall(r'- (\w+ \w+ \w+) (?:at|[-\d])', ' '.join(out.split())) == [
         'pitch hinge ground', 'roll hinge pitch', 'l motor ground', 'r motor ground',
         'ball_0 rod l', 'ball_1 rod r']
@@ -135,11 +135,11 @@ def test_hinges_of_rods_are_published(tmp_path, seed, count):
     mechanism, = imported(file)
     robot, closed = MuJoCo(file.read_text()), 0
     for left, right in np.random.default_rng(3).uniform(0.2, 0.4, (30, 2)):
-        found = published(mechanism, l=left, r=right)
-        assert found.keys() == {'l', 'r', 'pitch', 'roll', *(
+        positions = published(mechanism, l=left, r=right)
+        assert positions.keys() == {'l', 'r', 'pitch', 'roll', *(
             f'pin {i} {k}' for i in (0, 1) for k in (0, 1))}
-        if not np.isnan([*found.values()]).any():
-            robot.place(found)
+        if not np.isnan([*positions.values()]).any():
+            robot.place(positions)
             assert robot.open() < 1e-14
             closed += 1
     assert closed > 8
@@ -184,21 +184,21 @@ def limited(folder, seed, limits, **motors):
         joint = f'<joint name="{name}" '
         written = written.replace(joint, f'{joint}limited="true" range="{ends}" ')
     mechanism, = imported(of_text(folder / 'robot.xml', written))
-    return mechanism, {drive.source: drive for drive in mechanism.inputs.values()}
+    return mechanism, {settings.source: settings for settings in mechanism.inputs.values()}
 
 
 def test_limits_of_its_motors_are_sweeps(tmp_path):
-    _, drives = limited(tmp_path, 1, NEAR, l='-0.1 0.08', r='0.02 0.1')
-    assert drives['l'].ends == pytest.approx((-0.1, 0.08))
-    assert drives['r'].ends == pytest.approx((0.02, 0.1))
-    _, drives = limited(tmp_path, 1, NEAR, l='-0.1 0.08', r='-inf 0.02')
-    assert drives['r'].ends[1] == 0.02
+    _, settings = limited(tmp_path, 1, NEAR, l='-0.1 0.08', r='0.02 0.1')
+    assert settings['l'].ends == pytest.approx((-0.1, 0.08))
+    assert settings['r'].ends == pytest.approx((0.02, 0.1))
+    _, settings = limited(tmp_path, 1, NEAR, l='-0.1 0.08', r='-inf 0.02')
+    assert settings['r'].ends[1] == 0.02
 
 
 @pytest.mark.parametrize('seed, motors', [(1, {}), (2, {'l': '-1.5 1.5'})])
 def test_the_sweeps_of_an_ankle_s_motors_are_in_its_window(tmp_path, seed, motors):
     mechanism, drives = limited(tmp_path, seed, ([-0.5, -0.3], [0.4, 0.3]), **motors)
-    ends = [drive.ends for drive in drives.values()]
+    ends = [input_.ends for input_ in drives.values()]
     assert np.ptp(ends, axis=1).min() > 0.1
     values = np.meshgrid(*(np.linspace(*each, 50) for each in ends))
     assert np.isfinite(list(mechanism.linkage.joint_angles(values).values())).all()

@@ -59,21 +59,21 @@ def check_joints(robot, stands, form, read, joints, roots, size):
     for joint in robot.joints:
         if joint.position is None:
             continue
-        found = joints.pop(joint.name)
-        assert found.kind == joint.kind
-        assert found.bodies == tuple(roots[1] if body == roots[0] else body
-                                     for body in joint.bodies)
+        joint_ = joints.pop(joint.name)
+        assert joint_.kind == joint.kind
+        assert joint_.bodies == tuple(roots[1] if body == roots[0] else body
+                                      for body in joint.bodies)
         ground = stands[joint.bodies[1]]
-        for place, way in zip(found.places, found.axes):
+        for place, way in zip(joint_.places, joint_.axes):
             assert place == pytest.approx((ground @ [*joint.places[1], 1.0])[:3], abs=1e-12 * size)
             assert way == pytest.approx(ground[:3, :3] @ joint.axes[0], abs=1e-12)
-        assert found.position == pytest.approx(zeros[found.name], abs=1e-15)
-        shift = zeros[found.name] - starts[found.name]
+        assert joint_.position == pytest.approx(zeros[joint_.name], abs=1e-15)
+        shift = zeros[joint_.name] - starts[joint_.name]
         limits = joint.limits
         if form == 'urdf' and not limits and joint.kind == 'slide':
             limits = (-1e3, 1e3)
-        assert found.limits == (pytest.approx(tuple(end + shift for end in limits), rel=1e-12)
-                                if limits else None)
+        assert joint_.limits == (pytest.approx(tuple(end + shift for end in limits), rel=1e-12)
+                                 if limits else None)
     for name, (other, ratio, offset) in robot.follows.items() if form != 'urdf' else ():
         offset += ratio * (starts[other] - zeros[other]) - (starts[name] - zeros[name])
         assert read.follows[name] == (other, pytest.approx(ratio), pytest.approx(
@@ -108,10 +108,10 @@ def prepared(mechanisms, form, frame_id='world'):
 @pytest.mark.parametrize('form', FORMATS)
 @pytest.mark.parametrize('config', EXAMPLES, ids=lambda config: config.stem)
 def test_robots_of_the_shipped_scenes_come_back(tmp_path, config, form):
-    given = scene.load(str(config))
-    for mechanism in given.mechanisms.values():
+    shipped = scene.load(str(config))
+    for mechanism in shipped.mechanisms.values():
         if not mechanism.in_space:
-            check_read(prepared([mechanism], form, given.frame_id), form, tmp_path)
+            check_read(prepared([mechanism], form, shipped.frame_id), form, tmp_path)
 
 
 @pytest.mark.parametrize('form', FORMATS)
@@ -129,7 +129,7 @@ def random_mechanism(seed):
     if not (made := random_linkage(seed)):
         return None
     design, linkage, values, rng = made
-    given = {
+    parameters = {
         'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': design.joints,
         'm.pose': rng.normal(size=6).tolist(),
         **{f'm.branches.{key}': side for key, side in (design.branches or {}).items()},
@@ -137,10 +137,10 @@ def random_mechanism(seed):
         **{f'm.{each.name}.start': value for each, value in zip(linkage.inputs, values)}}
     with suppress(scene.SceneError):
         # Not all of it need be in the reach.
-        return scene.read({**given, **{
+        return scene.read({**parameters, **{
             f'm.{each.name}.sweep': [value - 0.01 * each.size, value + 0.01 * each.size]
             for each, value in zip(linkage.inputs, values)}}).mechanisms['m']
-    return scene.read(given).mechanisms['m']
+    return scene.read(parameters).mechanisms['m']
 
 
 @pytest.mark.parametrize('form', FORMATS)

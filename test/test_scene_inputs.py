@@ -58,29 +58,29 @@ class Case:
     """A mechanism of a scene, and the same linkage at full size."""
 
     def __init__(self, name, **more):
-        type_, lengths, lines, given, self.outputs, self.inputs = CASES[name]
-        self.given, self.scale = {**given, **more}, given['scale']
+        type_, lengths, lines, parameters, self.outputs, self.inputs = CASES[name]
+        self.parameters, self.scale = {**parameters, **more}, parameters['scale']
         own = {'joints': list(lines)} if lines else {}
-        self.mechanism = alone({'type': type_, **own, **self.given, **{
+        self.mechanism = alone({'type': type_, **own, **self.parameters, **{
             f'dimensions.{key}': value for key, value in lengths.items()}})
         self.linkage = mechanisms.create(type_, **own, **{
             key: self.scale * value for key, value in lengths.items()})
-        self.drives = [*self.mechanism.inputs.values()]
-        self.ratios = [self.given.get(f'{key}.ratio', 1.0) for key in self.mechanism.inputs]
-        self.offsets = [self.given.get(f'{key}.offset', 0.0) for key in self.mechanism.inputs]
+        self.settings = [*self.mechanism.inputs.values()]
+        self.ratios = [self.parameters.get(f'{key}.ratio', 1.0) for key in self.mechanism.inputs]
+        self.offsets = [self.parameters.get(f'{key}.offset', 0.0) for key in self.mechanism.inputs]
 
     def at(self, inputs, outputs=()):
         """Return outputs at inputs at full size, each a number or an array."""
-        theta = inputs if len(self.drives) > 1 else inputs[0]
+        theta = inputs if len(self.settings) > 1 else inputs[0]
         outputs = outputs or self.outputs
-        found = self.linkage.joint_angles(theta, outputs)
-        return [found[name][()] for name in outputs]
+        values = self.linkage.joint_angles(theta, outputs)
+        return [values[name][()] for name in outputs]
 
     def jacobian(self, inputs, outputs=()):
         """Return d output / d input, (outputs, inputs), by differences."""
         columns = []
-        for i, drive in enumerate(self.drives):
-            step = 1e-5 * (1.0 if drive.input.is_angle else self.scale)
+        for i, settings in enumerate(self.settings):
+            step = 1e-5 * (1.0 if settings.input.is_angle else self.scale)
             beside = [[*inputs[:i], inputs[i] + side * step, *inputs[i + 1:]] for side in (1, -1)]
             high, low = (np.array(self.at(each, outputs)) for each in beside)
             columns.append((high - low) / (2.0 * step))
@@ -102,35 +102,35 @@ def posed(request):
     return case, inputs, case.at(inputs), InverseRequest(case.mechanism, case.outputs)
 
 
-def near(found, expected):
+def agree(values, expected):
     """Assert that numbers are equal up to rounding."""
-    np.testing.assert_allclose(np.array(found, float), np.array(expected, float), 1e-9, 1e-9)
+    np.testing.assert_allclose(np.array(values, float), np.array(expected, float), 1e-9, 1e-9)
 
 
 def test_the_positions_for_outputs_are_those_that_give_them_and_rates_are_slopes(posed):
     case, inputs, values, request = posed
     positions = case.positions(inputs)
-    near(request.positions_of(inputs), positions)
-    near(request.inputs_of(positions), inputs)
+    agree(request.positions_of(inputs), positions)
+    agree(request.inputs_of(positions), inputs)
     slopes = (case.jacobian(inputs) * case.ratios).T.ravel()
     for shape in ((), (1,), (3,)):
-        given, beside = ([np.full(shape, each) if shape else float(each) for each in numbers]
-                         for numbers in (values, [p + 1e-3 for p in positions]))
+        targets, beside = ([np.full(shape, each) if shape else float(each) for each in numbers]
+                           for numbers in (values, [p + 1e-3 for p in positions]))
         for start in (beside, [np.ravel(each)[:1] if shape else each for each in beside]):
-            found, rates = request.positions(given, start)
-            assert [np.shape(each) for each in (*found, *rates)] == (
-                len(found) + len(rates)) * [shape]
-            near(np.moveaxis(found, 0, -1), np.broadcast_to(positions, (*shape, len(found))))
+            solved, rates = request.positions(targets, start)
+            assert [np.shape(each) for each in (*solved, *rates)] == (
+                len(solved) + len(rates)) * [shape]
+            agree(np.moveaxis(solved, 0, -1), np.broadcast_to(positions, (*shape, len(solved))))
             np.testing.assert_allclose(np.moveaxis(rates, 0, -1), np.broadcast_to(
                 slopes, (*shape, len(rates))), 1e-6, 1e-6)
-    found, _ = request.positions(values)
-    near(case.at(request.inputs_of(found)), values)
+    solved, _ = request.positions(values)
+    agree(case.at(request.inputs_of(solved)), values)
 
 
 def test_efforts_do_the_work_of_the_loads(posed):
     case, inputs, _, _ = posed
     work = np.zeros(len(inputs))
-    for load in case.given.get('loads', ()):
+    for load in case.parameters.get('loads', ()):
         name, _, figures = load.partition('=')
         outputs = [f'{name}.x', f'{name}.y'] if ' ' in figures else [name]
         work += np.array([*map(float, figures.split())]) @ case.jacobian(inputs, outputs)
@@ -144,23 +144,26 @@ def test_a_sensor_gives_the_input_and_an_input_the_sensor(name, output):
     case = Case(name)
     key, = case.mechanism.inputs
     case = Case(name, **{f'{key}.measures': output, f'{key}.ratio': 2.0, f'{key}.offset': 0.125})
-    drive, = case.drives
-    assert drive.source == f'm_{output}' and drive.actuator == (1.0, 0.0)
+    settings, = case.settings
+    assert settings.source == f'm_{output}' and settings.actuator == (1.0, 0.0)
     for (value,), speed in itertools.product(case.inputs, (0.0, -0.6)):
         (read,), (slope,) = case.at([value], [output]), case.jacobian([value], [output])[0]
-        position, rate = case.mechanism.to_source(drive, value, speed)
-        near([position], [(read - 0.125) / 2.0])
+        position, rate = case.mechanism.to_source(settings, value, speed)
+        agree([position], [(read - 0.125) / 2.0])
         assert rate == pytest.approx(slope * speed / 2.0, rel=1e-6, abs=1e-9)
-        near(case.mechanism.from_source(drive, position, rate, value + 1e-3), [value, speed])
-        assert case.mechanism.from_source(drive, position, None, value)[1] is None
+        agree(case.mechanism.from_source(settings, position, rate, value + 1e-3), [value, speed])
+        assert case.mechanism.from_source(settings, position, None, value)[1] is None
         # Without the last input the start counts; another source is not known.
-        first, _ = case.mechanism.from_source(drive, position, None, None)
-        near(first, case.mechanism.from_source(drive, position, None, drive.start)[0])
-        assert present_inputs(case.mechanism, {drive.source: position, 'other': 9.0}) == [first]
-        assert present_inputs(case.mechanism, {}) == [drive.start]
+        first, _ = case.mechanism.from_source(settings, position, None, None)
+        agree(first, case.mechanism.from_source(settings, position, None, settings.start)[0])
+        assert present_inputs(case.mechanism, {settings.source: position, 'other': 9.0}) == [first]
+        assert present_inputs(case.mechanism, {}) == [settings.start]
+    # At an extreme of the output nobody knows how fast the input is.
+    engine = alone('slider_crank', dimensions__c=0.0, crank__measures='block')
+    assert np.isnan(engine.from_source(engine.first, 160.0, 1.0, 0.1)[1])
     if not case.mechanism.linkage.is_angle(output):
-        assert math.isnan(case.mechanism.from_source(drive, 1e6, 1.0, 0.0)[0])
-        assert present_inputs(case.mechanism, {drive.source: 1e6}) == [drive.start]
+        assert math.isnan(case.mechanism.from_source(settings, 1e6, 1.0, 0.0)[0])
+        assert present_inputs(case.mechanism, {settings.source: 1e6}) == [settings.start]
 
 
 def test_where_the_way_leads_out_of_the_sweep_one_input_jumps_into_it():
@@ -172,14 +175,14 @@ def test_where_the_way_leads_out_of_the_sweep_one_input_jumps_into_it():
             ([5.0, 6.0], 0.5, math.tau - 0.9)):
         mechanism = alone('slider_crank', scale=0.5, dimensions__c=0.0, crank__sweep=sweep)
         for jumps in (False, True):
-            near(InverseRequest(mechanism, ['block']).command(
+            agree(InverseRequest(mechanism, ['block']).command(
                 [0.5 * block], None, [near_], jumps).inputs, [expected])
-        near(mechanism.follow(['block'], [0.5 * block], [near_])[0][0], expected)
+        agree(mechanism.follow(['block'], [0.5 * block], [near_])[0][0], expected)
         # An end of the sweep is an answer, however the output is rounded.
         answers = [InverseRequest(mechanism, ['block']).answers(
             [0.5 * block * (1.0 + rounding)], [near_]) for rounding in (-2e-16, 0.0, 2e-16)]
-        near([[found for (found,), _ in some[:1]] for some in answers],
-             3 * [[expected] * math.isfinite(expected)])
+        agree([[found for (found,), _ in some[:1]] for some in answers],
+              3 * [[expected] * math.isfinite(expected)])
 
 
 @pytest.mark.parametrize('scale', [0.5, 4.0])
@@ -195,15 +198,15 @@ def test_several_inputs_jump_only_if_they_may(scale):
         inside = [mode for mode in modes if not more or mode[0] < ends[1]]
         expected = sorted(inside, key=lambda mode: math.dist(mode, start))
         for jumps in (False, True):
-            found = request.command(values, [0.1, 0.0], start, jumps)
-            near(found.inputs, expected[0] if jumps or not more else 2 * [math.nan])
-        near(sorted(inputs for inputs, _ in request.answers(values)), sorted(inside))
+            command = request.command(values, [0.1, 0.0], start, jumps)
+            agree(command.inputs, expected[0] if jumps or not more else 2 * [math.nan])
+        agree(sorted(inputs for inputs, _ in request.answers(values)), sorted(inside))
     assert inside and len(inside) < len(modes)
     # The end of a sweep is not beyond it, however the outputs are rounded.
     for second in np.linspace(start[1] - 0.3, start[1] + 0.3, 9):
         places = mechanisms.create('five_bar').solve([ends[1], second], ['P'])['P'] * scale
-        near(request.command(places.tolist(), None, [ends[1] - 0.01, second]).inputs,
-             [ends[1], second])
+        agree(request.command(places.tolist(), None, [ends[1] - 0.01, second]).inputs,
+              [ends[1], second])
 
 
 @pytest.mark.parametrize('name, sweep, value, reason', [
@@ -229,10 +232,10 @@ def test_a_value_out_of_reach_is_told_the_range_or_the_input_that_it_needs(
         near_, = case.at([place])
         assert near_ == pytest.approx(value, rel=1e-4) and not sweep[0] <= place <= sweep[1]
     elif 'reaches' in reason:
-        ends = sweep or case.drives[0].reach[0]
+        ends = sweep or case.settings[0].reach[0]
         values, = case.at([np.linspace(*ends, 20001)])
-        found = re.search(r'\[(\S+), (\S+)\]', reason).groups()
-        near([*map(float, found)], [float(f'{end:.6g}') for end in (values.min(), values.max())])
+        texts = re.search(r'\[(\S+), (\S+)\]', reason).groups()
+        agree([*map(float, texts)], [float(f'{end:.6g}') for end in (values.min(), values.max())])
 
 
 @pytest.mark.parametrize('name, output', [

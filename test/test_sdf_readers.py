@@ -186,5 +186,5 @@ def test_links_are_where_they_were_before_they_were_written(tmp_path, seeds):
         for name, (leader, ratio, offset, reference) in made.follows.items():
             assert robot.follows[name][0] == leader
             for position in (-1.0, 0.0, 2.0):
-                found = robot.follows[name][1] * position + robot.follows[name][2]
-                assert found == pytest.approx(ratio * (position - reference) + offset)
+                followed = robot.follows[name][1] * position + robot.follows[name][2]
+                assert followed == pytest.approx(ratio * (position - reference) + offset)

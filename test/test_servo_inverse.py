@@ -18,14 +18,14 @@ from truth.working_modes import five_bar, lever_of
 TWO = {'mechanisms': ['left', 'right', 'drop'], 'left.type': 'slotted_lever',
        'right.type': 'slotted_lever', 'right.dimensions.a': 200.0, 'drop.type': 'water_drop'}
 def test_each_servo_angle_puts_the_lever_where_it_is_wanted(graph):
-    wanted = [0.0, 0.1, -0.3, 0.5, math.asin(80.0 / 150.0) * (1.0 - 1e-9)]
+    levers = [0.0, 0.1, -0.3, 0.5, math.asin(80.0 / 150.0) * (1.0 - 1e-9)]
     graph.start(ServoInverse)
     client = graph.node.create_client(Service, 'servo_inverse')
-    near = [math.tau * turns for turns in range(len(wanted))]
-    response = graph.call(client, Service.Request(lever_angle=wanted, servo_near=near))
+    near = [math.tau * turns for turns in range(len(levers))]
+    response = graph.call(client, Service.Request(lever_angle=levers, servo_near=near))
     assert response.success and response.message == '' and all(response.reachable)
     assert [round(servo / math.tau) for servo in response.servo_angle] == [0, 1, 2, 3, 4]
-    for phi, servo, reduction in zip(wanted, response.servo_angle, response.reduction):
+    for phi, servo, reduction in zip(levers, response.servo_angle, response.reduction):
         assert lever_of(servo) == pytest.approx(phi, abs=1e-15)
         slope = (lever_of(servo + 1e-6) - lever_of(servo - 1e-6)) / 2e-6
         assert reduction == pytest.approx(slope, abs=1e-9)
@@ -70,8 +70,8 @@ def test_a_request_that_cannot_be_answered_gets_the_reason_alone(graph, paramete
 
 
 @pytest.mark.parametrize('fields, message', [
-    ({'lever_angle': [0.1, 0.6, 0.1, math.nan, -math.inf]},
-     'lever cannot be 0.6, nan, -inf; lever reaches [-0.562536, 0.562536] rad'),
+    ({'lever_angle': [0.1, math.nan, 0.6, 0.1, -math.inf]},
+     'lever cannot be nan, 0.6, -inf; lever reaches [-0.562536, 0.562536] rad'),
     ({'lever_angle': [0.1] + [1.0] * 9}, 'lever cannot be 1, 1, 1, 1, 1 and 4 more'
      '; lever reaches [-0.562536, 0.562536] rad'),
     ({'lever_angle': [1e308], 'output': 'G.x', 'mechanism': 'jansen'},
@@ -157,5 +157,5 @@ def test_the_service_answers_on_the_working_branch_wherever_the_crank_is(graph):
     for start in (0.4, 2.9):
         graph.set(driver, lever__crank__start=start, lever__crank__speed=0.0)
         graph.until(lambda start=start: cranks and cranks[-1].position[0] == start)
-        found = graph.call(client, Service.Request(lever_angle=[lever_of(0.4)]))
-        assert found.success and found.servo_angle[0] == pytest.approx(0.4, abs=1e-9)
+        response = graph.call(client, Service.Request(lever_angle=[lever_of(0.4)]))
+        assert response.success and response.servo_angle[0] == pytest.approx(0.4, abs=1e-9)

@@ -20,11 +20,11 @@ BUCKET = 'H.x', 'H.y', 'angle(H,J)'
 
 def agree(linkage, outputs, values, expected, sure=1e-3):
     """Check that the answers are those expected; return the greatest difference [sizes]."""
-    found, expected, worst = linkage.inputs_for(outputs, values), list(expected), 0.0
-    assert len(found) == len(expected), (linkage, values, found, expected)
+    solutions, expected, worst = linkage.inputs_for(outputs, values), list(expected), 0.0
+    assert len(solutions) == len(expected), (linkage, values, solutions, expected)
     for inputs, bends in expected:
         gap, answer = min((max(input_.distance(x, y) / input_.size for input_, x, y in zip(
-            linkage.inputs, answer.inputs, inputs)), answer) for answer in found)
+            linkage.inputs, answer.inputs, inputs)), answer) for answer in solutions)
         assert gap * answer.margin < 1e-12, (linkage, values, inputs, answer)
         assert answer.margin < sure or bends.items() <= answer.signs.items()
         worst = max(worst, gap)
@@ -77,8 +77,8 @@ def test_a_mode_is_followed_where_that_beyond_the_fold_is_nearer():
     nearer, kept = inverse.all(values, near)[:2]
     assert (nearer.mode, kept.mode) == ('AP+ CP- det-', 'AP+ CP+ det+')
     with few_calls(3000):
-        found, _ = inverse.follow(values, near)
-    assert found == pytest.approx(kept.inputs, abs=1e-9)
+        inputs, _ = inverse.follow(values, near)
+    assert inputs == pytest.approx(kept.inputs, abs=1e-9)
 
 
 def test_next_to_a_fold_both_searched_solutions_are_found_and_at_it_one():
@@ -148,10 +148,10 @@ def test_an_input_that_is_held_is_held_in_its_own_turn(hung, seed):
     (('P.x', 'P.y'), 'ab', "values must be a number or an array of numbers, got 'ab'")])
 def test_what_cannot_be_asked_is_refused_with_the_reason(outputs, values, reason):
     linkage = mechanisms.create('five_bar')
-    for ask in (linkage.inputs_for, lambda names, given: linkage.inverse(
+    for call in (linkage.inputs_for, lambda names, given: linkage.inverse(
             names).follow(given, (1.9, 1.2))):
         with pytest.raises(ValueError, match=reason):
-            ask(outputs, values)
+            call(outputs, values)
 
 
 def test_a_place_to_start_from_may_be_anything():
@@ -166,15 +166,15 @@ def test_a_place_to_start_from_may_be_anything():
 
 
 def test_answers_lie_in_the_sweeps_or_the_reason_says_so():
-    wanted = InverseRequest(alone('five_bar', crank__sweep=[6.0, 9.0]), ('P.x', 'P.y'))
-    answers = wanted.answers((0.05, 0.15), (0.0, 0.0))
+    request = InverseRequest(alone('five_bar', crank__sweep=[6.0, 9.0]), ('P.x', 'P.y'))
+    answers = request.answers((0.05, 0.15), (0.0, 0.0))
     assert answers and all(6.0 <= inputs[0] <= 9.0 for inputs, _ in answers)
     assert answers[0][0][0] == pytest.approx(min(inputs[0] for inputs, _ in answers))
-    found, _, _ = wanted.command((0.05, 0.15), None, (0.0, 0.0), jumps=True)
-    assert found == pytest.approx(answers[0][0])
-    wanted = InverseRequest(alone('five_bar', crank__sweep=[3.0, 3.5]), ('P.x', 'P.y'))
-    assert wanted.answers((0.05, 0.15), (3.2, 0.0)) == []
-    assert wanted.reason(0.05, 0.15) == (
+    nearest, _, _ = request.command((0.05, 0.15), None, (0.0, 0.0), jumps=True)
+    assert nearest == pytest.approx(answers[0][0])
+    request = InverseRequest(alone('five_bar', crank__sweep=[3.0, 3.5]), ('P.x', 'P.y'))
+    assert request.answers((0.05, 0.15), (3.2, 0.0)) == []
+    assert request.reason(0.05, 0.15) == (
         'P.x, P.y at 0.05, 0.15 needs the crank at 1.74732 rad, crank2 at 1.58104 rad, outside '
         'crank.sweep [3, 3.5]')
 
@@ -187,12 +187,12 @@ def test_an_output_that_stands_still_in_most_poses_is_answered_where_it_moves():
         'G dyad A F d4 d4 right', 'H line F G d6', 'J K L inversor A F d7 2.0073'],
         d1=2.2362640741019026, d2=0.8931826658923526, d3=0.8931826658923615, d4=2.6947387147872717,
         d6=5.557896960568358, d7=0.8324685908048884)
-    drive = 2.403985938284456
+    length = 2.403985938284456
     for crank in (1.45, 2.5):
-        value = float(linkage.solve((crank, drive))['J'][1])
-        moves = abs(float(linkage.velocity((crank, drive))['J'][1])) > 1e-9
-        found = linkage.input_for('J.y', value, others=(drive,))
-        assert moves == (crank == 1.45) == (np.nanmin(abs(found - crank), initial=9.0) < 1e-9)
+        value = float(linkage.solve((crank, length))['J'][1])
+        moves = abs(float(linkage.velocity((crank, length))['J'][1])) > 1e-9
+        inputs = linkage.input_for('J.y', value, others=(length,))
+        assert moves == (crank == 1.45) == (np.nanmin(abs(inputs - crank), initial=9.0) < 1e-9)
 
 
 @pytest.mark.parametrize('unit', [1.0, 1e-26, 1e20])
@@ -202,5 +202,5 @@ def test_what_is_searched_is_found_in_any_unit(unit):
         c=3.6 * unit, e=0.42 * unit, f=4.0 * unit)
     pose, outputs = (0.04, 1.4 * unit), ('F.x', 'barrel')
     values = [float(linkage.solve(pose)['F'][0]), float(linkage.joint_angles(pose)['barrel'])]
-    found = linkage.inverse(outputs).all(values)
-    assert any(solution.inputs == pytest.approx(pose, rel=1e-9) for solution in found)
+    solutions = linkage.inverse(outputs).all(values)
+    assert any(solution.inputs == pytest.approx(pose, rel=1e-9) for solution in solutions)

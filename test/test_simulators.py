@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from robots import MuJoCo, of_text, published
 from scenes import EXAMPLES, ROOT
-from test_urdf import drives, in_space, MACHINES, OWN, posed
+from test_urdf import FROM_CASES, in_space, input_rows, joints_and_places, MECHANISMS
 
 # On the way to a change point: the side seen at the start is not the one behind it.
 FOLDS = {'water_drop'}
@@ -21,15 +21,15 @@ CONFIGS = [path.stem for path in EXAMPLES if path.parent.name == 'config']
 
 
 def simulated(name):
-    """Return a mechanism of about a metre that starts in the middle of its reach."""
-    one = {**MACHINES, **OWN}[name]()
-    given = {**{each.name: each.value for each in one.parameters if each.value != ()},
-             'm.scale': one.scale / bodies.size(one)}
-    one = scene.read({'mechanisms': ['m'], **given}).mechanisms['m']
-    rows = drives(one)
-    given.update((f'm.{key}.start', value) for key, value in zip(
-        one.inputs, rows[len(rows) // 2].tolist()))
-    return scene.read({'mechanisms': ['m'], **given}).mechanisms['m']
+    """Return a mechanism of half a metre that starts in the middle of its reach."""
+    mechanism = {**MECHANISMS, **FROM_CASES}[name]()
+    parameters = {**{each.name: each.value for each in mechanism.parameters if each.value != ()},
+                  'm.scale': 0.5 * mechanism.scale / bodies.size(mechanism)}
+    mechanism = scene.read({'mechanisms': ['m'], **parameters}).mechanisms['m']
+    rows = input_rows(mechanism)
+    parameters.update((f'm.{key}.start', value) for key, value in zip(
+        mechanism.inputs, rows[len(rows) // 2].tolist()))
+    return scene.read({'mechanisms': ['m'], **parameters}).mechanisms['m']
 
 
 def some_quick(names, quick):
@@ -65,73 +65,73 @@ class Simulation(MuJoCo):
 
 @pytest.mark.parametrize('config', some_quick(CONFIGS, ('all', 'excavator')))
 def test_gravity_tears_no_scene(config):
-    found = mechanisms(config).values()
-    robot, bar = Simulation(mjcf.write(model(found))), min(map(bodies.size, found))
+    mechanisms_ = mechanisms(config).values()
+    robot, bar = Simulation(mjcf.write(model(mechanisms_))), min(map(bodies.size, mechanisms_))
     assert max(robot.open() for _ in robot.run(1.0)) < 1e-5 * bar
 
 
-def follow(one, robot, seconds):
+def follow(mechanism, robot, seconds):
     """Drive inputs through their sweeps, or a turn; return how far points are from `solve`."""
-    solution = one.assembly().solution(one.linkage.points)
-    names = [f'{one.name}_{prefix}{point}' for prefix in one.assembly().legs
-             for point in one.linkage.points]
+    solution = mechanism.assembly().solution(mechanism.linkage.points)
+    names = [f'{mechanism.name}_{prefix}{point}' for prefix in mechanism.assembly().legs
+             for point in mechanism.linkage.points]
     starts = robot.data.ctrl.copy()
 
     def inputs(time):
         turned = 0.5 - 0.5 * math.cos(math.pi * time / seconds)
-        for start, drive in zip(starts, one.inputs.values()):
-            low, high = drive.sweep or (start, start + 2.0 * math.tau)
+        for start, settings in zip(starts, mechanism.inputs.values()):
+            low, high = settings.sweep or (start, start + 2.0 * math.tau)
             phase = math.acos(1.0 - 2.0 * (start - low) / (high - low))
             yield low + (high - low) * (0.5 - 0.5 * math.cos(phase + math.pi * turned))
 
     for _ in robot.run(seconds, lambda time: [*inputs(time)]):
-        solution.solve([float(robot.data.joint(one.joints[name].name).qpos[0])
-                        for name in one.inputs])
-        places = in_space(one.pose, solution.rows.reshape(-1, 2))
+        solution.solve([float(robot.data.joint(mechanism.joints[name].name).qpos[0])
+                        for name in mechanism.inputs])
+        places = in_space(mechanism.pose, solution.rows.reshape(-1, 2))
         yield np.abs(np.array(places) - [*robot.places(names).values()]).max()
 
 
 @pytest.mark.parametrize('config', some_quick(CONFIGS, ('jansen', 'rack_steering')))
 def test_servos_drive_the_linkage_through_the_poses_of_solve(config):
-    for one in mechanisms(config).values():
-        robot = Simulation(mjcf.write(model([one])))
-        assert max(follow(one, robot, 2.0)) < 2e-3 * bodies.size(one)
+    for mechanism in mechanisms(config).values():
+        robot = Simulation(mjcf.write(model([mechanism])))
+        assert max(follow(mechanism, robot, 2.0)) < 2e-3 * bodies.size(mechanism)
 
 
 @pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('form', [sdf, mjcf], ids=['sdf', 'mjcf'])
 @pytest.mark.parametrize('name', some_quick(
-    sorted({*MACHINES, 'excavator', 'parallelogram arm', 'scissor lift', 'rack steering',
+    sorted({*MECHANISMS, 'excavator', 'parallelogram arm', 'scissor lift', 'rack steering',
             'Scotch yoke', 'trammel of Archimedes', 'geared five-bar'} - FOLDS),
     ('jansen', 'boom and arm', 'boxer engine', 'Scotch yoke', 'five-bar with a gear')))
 def test_a_linkage_comes_back_from_its_simulator_s_file(tmp_path, form, name):
-    one = simulated(name)
-    built = model([one])
+    mechanism = simulated(name)
+    built = model([mechanism])
     file = of_text(tmp_path / 'robot.xml', form.write(built))
     robot = readers.read(str(file))
-    given, said, still = from_robot.described(robot)
-    assert not any(line.startswith('Left out') for line in said)
+    parameters, reports, still = from_robot.described(robot)
+    assert not any(line.startswith('Left out') for line in reports)
     # An SDF has its zeros where it starts.
     zeros = {joint.name: joint.start if form is sdf else 0.0 for joint in built.joints}
     turns = {joint.name: joint.kind == 'hinge' for joint in built.joints}
     # Open chains, too, are joints of the whole robot.
-    rest, _ = from_robot.others(robot, scene.read(given).mechanisms, still)
-    mechanisms = scene.read({**given, **rest}).mechanisms.values()
+    rest, _ = from_robot.others(robot, scene.read(parameters).mechanisms, still)
+    mechanisms = scene.read({**parameters, **rest}).mechanisms.values()
     # A file has 15 digits: exactly at an end of the reach its linkage may not be assembled.
-    ends = np.ravel(one.first.reach) if len(one.inputs) == 1 else ()
-    for thetas in drives(one, 9):
+    ends = np.ravel(mechanism.first.reach) if len(mechanism.inputs) == 1 else ()
+    for thetas in input_rows(mechanism, 9):
         if thetas[0] in ends:
             continue
-        wanted = {name: value - zeros[name] for name, value in posed(one, thetas)[0].items()}
-        found = {}
+        positions, _ = joints_and_places(mechanism, thetas)
+        expected, imported = {name: positions[name] - zeros[name] for name in positions}, {}
         for each in mechanisms:
-            found.update(published(each, **{
-                drive.source: wanted[drive.source] for drive in each.inputs.values()}))
-        for joint, value in wanted.items():
-            apart = found[joint] - value
-            apart = math.remainder(apart, math.tau) if turns[joint] else apart
+            imported.update(published(each, **{
+                settings.source: expected[settings.source] for settings in each.inputs.values()}))
+        for joint, value in expected.items():
+            error = imported[joint] - value
+            error = math.remainder(error, math.tau) if turns[joint] else error
             # At a dead point half of the digits of an angle are in its sine.
-            assert apart == pytest.approx(0.0, abs=1e-7), (joint, thetas)
+            assert error == pytest.approx(0.0, abs=1e-7), (joint, thetas)
 
 
 @pytest.mark.parametrize('name', ['engine', 'boom and arm'])
@@ -160,4 +160,4 @@ def test_bodies_weigh_in_an_sdf_what_mujoco_finds_their_shapes_to_weigh(name):
 
 def test_a_start_out_of_reach_is_refused():
     with pytest.raises(scene.SceneError, match='m.cylinder.start and .* must be where m can be'):
-        model([OWN['excavator']()])
+        model([FROM_CASES['excavator']()])

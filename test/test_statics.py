@@ -14,11 +14,11 @@ def test_loads_may_differ_from_pose_to_pose(shape):
     arm, rng = mechanisms.create('five_bar'), np.random.default_rng(6)
     theta = rng.uniform(1.5, 2.0, shape), rng.uniform(0.5, 1.0, shape)
     loads = {'P': rng.uniform(-1.0, 1.0, (*shape, 2)), 'AP': rng.uniform(-1.0, 1.0, shape)}
-    found = arm.effort(theta, loads)
-    assert found.shape == (*shape, 2)
+    efforts = arm.effort(theta, loads)
+    assert efforts.shape == (*shape, 2)
     for place in np.ndindex(shape):
         own = arm.effort([x[place] for x in theta], {name: x[place] for name, x in loads.items()})
-        np.testing.assert_allclose(found[place], own, rtol=1e-12)
+        np.testing.assert_allclose(efforts[place], own, rtol=1e-12)
 
 
 def test_what_is_not_loaded_needs_no_effort_even_at_a_dead_point():
@@ -46,17 +46,17 @@ def test_the_effort_of_an_output_has_the_power_of_the_input(output, theta):
     bars, step = mechanisms.create('four_bar'), 2.0 ** -17
     before, after = (bars.joint_angles(np.array(theta) + side * step, (output,))[output]
                      for side in (-1.0, 1.0))
-    found = bars.output_effort(output, theta, 6.0)
-    assert np.shape(found) == np.shape(theta)
-    np.testing.assert_allclose(found * (after - before) / (2.0 * step), 6.0, rtol=1e-7)
+    efforts = bars.output_effort(output, theta, 6.0)
+    assert np.shape(efforts) == np.shape(theta)
+    np.testing.assert_allclose(efforts * (after - before) / (2.0 * step), 6.0, rtol=1e-7)
 
 
-@pytest.mark.parametrize('loads, said', [
+@pytest.mark.parametrize('loads, reason', [
     ({'Z': (1.0, 2.0)}, "no joint or link 'Z' to load; allowed: O, Q, A"),
     ({'B': 3.0}, 'the load on the joint B must be a force x, y'),
     ({'B': (1.0, 2.0, 3.0)}, 'the load on the joint B must be a force x, y'),
     ({'QB': 'much'}, 'the load on QB'),
     *((loads, 'loads must be a mapping') for loads in ([1.0, 2.0], 'B', 3.0, None))])
-def test_a_load_that_cannot_be_is_refused(loads, said):
-    with pytest.raises(ValueError, match=said):
+def test_a_load_that_cannot_be_is_refused(loads, reason):
+    with pytest.raises(ValueError, match=reason):
         mechanisms.create('four_bar').effort(0.4, loads)

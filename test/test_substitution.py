@@ -27,36 +27,36 @@ def some(rng, values):
     return values[rng.integers(max(len(values), 1))]
 
 
-def with_sign(given, rng):
+def with_sign(parameters, rng):
     """Turn the sign of a published joint."""
-    line = given['joint_names'][at := some(rng, range(len(given['joint_names'])))]
+    line = parameters['joint_names'][at := some(rng, range(len(parameters['joint_names'])))]
     link, _, name = line.partition('=')
-    given['joint_names'][at] = f'{link}={name[1:] if name[0] == "-" else f"-{name}"}'
+    parameters['joint_names'][at] = f'{link}={name[1:] if name[0] == "-" else f"-{name}"}'
 
 
-def with_offset(given, rng):
+def with_offset(parameters, rng):
     """Move the zero of a published joint by 1e-6 rad or m."""
-    at = some(rng, range(len(given['joint_names'])))
-    found = re.fullmatch(r'(.*?)([+-][\d.e+-]+)?', given['joint_names'][at])
-    given['joint_names'][at] = f'{found[1]}{float(found[2] or 0.0) + 1e-6:+}'
+    at = some(rng, range(len(parameters['joint_names'])))
+    match = re.fullmatch(r'(.*?)([+-][\d.e+-]+)?', parameters['joint_names'][at])
+    parameters['joint_names'][at] = f'{match[1]}{float(match[2] or 0.0) + 1e-6:+}'
 
 
-def with_side(given, rng):
+def with_side(parameters, rng):
     """Take the other side of a dyad."""
-    at = some(rng, [i for i, line in enumerate(given['joints']) if line.split()[-1] in SIDES])
-    *words, side = given['joints'][at].split()
-    given['joints'][at] = ' '.join([*words, SIDES[side]])
+    at = some(rng, [i for i, line in enumerate(parameters['joints']) if line.split()[-1] in SIDES])
+    *words, side = parameters['joints'][at].split()
+    parameters['joints'][at] = ' '.join([*words, SIDES[side]])
 
 
-def with_length(given, rng):
+def with_length(parameters, rng):
     """Make a number of a line wrong by 1e-5 of the largest one."""
-    numbers = [(i, k) for i, line in enumerate(given['joints'])
+    numbers = [(i, k) for i, line in enumerate(parameters['joints'])
                for k, word in enumerate(line.split()) if k > 1 and re.match(r'-?\d', word)]
-    size = max(abs(float(given['joints'][i].split()[k])) for i, k in numbers)
+    size = max(abs(float(parameters['joints'][i].split()[k])) for i, k in numbers)
     i, k = some(rng, numbers[2:])
-    words = given['joints'][i].split()
+    words = parameters['joints'][i].split()
     words[k] = repr(float(words[k]) + 1e-5 * size * rng.choice([-1.0, 1.0]))
-    given['joints'][i] = ' '.join(words)
+    parameters['joints'][i] = ' '.join(words)
 
 
 KINDS = with_sign, with_offset, with_side, with_length
@@ -72,8 +72,9 @@ def is_found(robot, mechanism, values, made):
             return True
     except scene.SceneError:
         return True
-    values = theta_of([np.linspace(*drive.ends or (drive.start - 0.1, drive.start + 0.1), 9)
-                       for drive in mechanism.inputs.values()])
+    values = theta_of([
+        np.linspace(*settings.ends or settings.start + np.array([-0.1, 0.1]), 9)
+        for settings in mechanism.inputs.values()])
     one, other = (each.linkage.joint_angles(values) for each in (mechanism, wrong))
     off = [mechanism.joints[link].of(one[link]) - wrong.joints[link].of(other[link])
            for link in mechanism.joints if mechanism.joints[link].published]
@@ -95,13 +96,14 @@ def ankle(seed, folder):
 
 def faults(robot, seed):
     """Yield each fault of a robot's scene, and whether it is found."""
-    rng, given = np.random.default_rng(seed), {}
+    rng, parameters = np.random.default_rng(seed), {}
     with patch.object(check, 'compared', wraps=check.compared) as spy, suppress(RequestError):
-        given = described(robot)[0] if robot else {}
-    for robot, mechanisms, made in ((*call.args[:2], made) for call in spy.call_args_list
-                                    for made in call.args[2] if made.name in given['mechanisms']):
+        parameters = described(robot)[0] if robot else {}
+    for robot, mechanisms, made in (
+            (*call.args[:2], made) for call in spy.call_args_list
+            for made in call.args[2] if made.name in parameters['mechanisms']):
         mechanism = mechanisms[made.name]
-        own = {key.partition('.')[2]: value for key, value in given.items()
+        own = {key.partition('.')[2]: value for key, value in parameters.items()
                if key.startswith(f'{mechanism.name}.')}
         for _ in range(FAULTS):
             values = {key: value[:] if isinstance(value, list) else value

@@ -81,5 +81,5 @@ WATER_DROP = """
 def test_places_are_those_of_the_table_of_the_original_program(kind, lengths, joints, table):
     linkage = mechanisms.create(kind, **lengths)
     for theta, *places in (map(float, line.split()) for line in table.strip().splitlines()):
-        found = linkage.solve(math.radians(theta), [*joints])
-        np.testing.assert_allclose(np.ravel([*found.values()]), places, rtol=0.0, atol=5e-4)
+        solved = linkage.solve(math.radians(theta), [*joints])
+        np.testing.assert_allclose(np.ravel([*solved.values()]), places, rtol=0.0, atol=5e-4)

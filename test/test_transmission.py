@@ -72,16 +72,16 @@ GEARED = ['O ground 0 0', 'Q ground 1.49 -0.6', 'A crank O 0.427',
 
 def states(mechanism, count, seed=1):
     """Return values of all inputs in the scene's units that can be assembled, not at the ends."""
-    rng, found = np.random.default_rng(seed), []
-    while len(found) < count:
+    rng, states_ = np.random.default_rng(seed), []
+    while len(states_) < count:
         own = []
-        for drive in mechanism.inputs.values():
-            low, high = drive.ends or drive.reach[0]
+        for settings in mechanism.inputs.values():
+            low, high = settings.ends or settings.reach[0]
             own.append(rng.uniform(low + 0.02 * (high - low), high - 0.02 * (high - low)))
         values = outputs(mechanism, own, [each.output for each in joints(mechanism)])
         if np.isfinite(values).all():
-            found.append(own)
-    return found
+            states_.append(own)
+    return states_
 
 
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
@@ -136,8 +136,9 @@ CHOICES = [
     ([*GEARED[:3], 'D crank Q 0.27 geared crank -2 -1.4', GEARED[4]], {}, [], 1,
      [(-2.0 * crank - 1.4, crank) for crank in (0.4, -6.4)]),
     # What does not count turns is within one with its offset.
-    (LIFT, {'joint_names': ['QB=wheel+3.0']}, ['wheel'], 0,
-     [(0.5, math.remainder(READING + 3.1, math.tau))]),
+    *((LIFT, {'joint_names': [f'QB={sign}3.0']}, ['wheel'], 0,
+       [(0.5, side * math.remainder(READING + 3.1, math.tau))])
+      for sign, side in (('wheel+', 1.0), ('-wheel-', -1.0))),
     # A sensor repeats after a turn of what it measures; a geared one counts turns.
     *((LIFT, {'crank.measures': 'QB', 'crank.ratio': ratio, 'crank.offset': 0.1,
               'crank.start': 0.5}, ['crank'], 0,
@@ -172,7 +173,7 @@ CHOICES = [
 @pytest.fixture(scope='module')
 def choosing(tmp_path_factory):
     """Return the mechanisms of CHOICES, and their library."""
-    made = [alone(lines, f'm{i}', **given) for i, (lines, given, *_) in enumerate(CHOICES)]
+    made = [alone(lines, f'm{i}', **settings) for i, (lines, settings, *_) in enumerate(CHOICES)]
     text = memories([header.Request(mechanism, (), [
         each if each == 'wheel' else f'{mechanism.name}_{each}' for each in names])
         for mechanism, (_, _, names, *_) in zip(made, CHOICES)])
@@ -184,9 +185,9 @@ def choosing(tmp_path_factory):
 def test_the_right_one_of_several_inputs_is_chosen(choosing, i):
     (*_, side, pairs), (made, library) = CHOICES[i], choosing
     for position, expected_ in pairs:
-        status, (found, *_) = Memory(library, made[i]).send(side, [position])
+        status, (position_, *_) = Memory(library, made[i]).send(side, [position])
         assert status & 1 == (expected_ is None)
-        assert status or found[0] == pytest.approx(expected_, rel=1e-12, abs=1e-10)
+        assert status or position_[0] == pytest.approx(expected_, rel=1e-12, abs=1e-10)
 
 
 def test_single_precision_reads_a_sensor_that_has_turned_for_long(tmp_path):
@@ -298,8 +299,8 @@ def test_a_singular_pose_is_said(library, mechanisms):
 
 @pytest.mark.parametrize('side, position, said', [(1, math.nan, 4), (1, 4.0, 5), (0, 1e9, 5)])
 def test_before_a_position_is_known_none_is_written(library, mechanisms, side, position, said):
-    status, found = Memory(library, mechanisms['boom']).send(side, [position], [1.0], [1.0])
-    assert status == said and (found[:3 if side else 1] == UNWRITTEN).all()
+    status, values = Memory(library, mechanisms['boom']).send(side, [position], [1.0], [1.0])
+    assert status == said and (values[:3 if side else 1] == UNWRITTEN).all()
 
 
 @pytest.mark.nightly(all_but=5)
@@ -311,14 +312,14 @@ def test_nothing_that_comes_in_gets_out_as_no_number(library, mechanisms, name):
     values = [math.nan, math.inf, -math.inf, 1e308, -1e300, 5e-324, 0.0, 1.0, 1e-3, 3.0]
     for _ in range(400):
         side, given = int(rng.integers(2)), rng.choice(values, (3, n))
-        status, found = memory.send(side, *given)
-        assert 0 <= status < 8 and np.isfinite(found).all()
+        status, written_ = memory.send(side, *given)
+        assert 0 <= status < 8 and np.isfinite(written_).all()
         # What is not commanded is not written, and all else is.
         is_missing = ~np.isfinite(given).all(axis=1) & bool(side)
-        assert ((found == UNWRITTEN) == is_missing[:, None]).all()
+        assert ((written_ == UNWRITTEN) == is_missing[:, None]).all()
 
 
-@pytest.mark.parametrize('linkage, given, chosen', [
+@pytest.mark.parametrize('linkage, parameters, chosen', [
     # A chain of links from the ground, each of which tells more than those before, wherever it is.
     ('five_bar', {}, ['m_crank', 'm_AP']), ('slider_crank', {}, ['m_block']),
     ('klann', {}, ['m_BD']),
@@ -339,8 +340,8 @@ def test_nothing_that_comes_in_gets_out_as_no_number(library, mechanisms, name):
     # What is published comes first.
     ('klann', {'joint_names': ['EF=knee'], 'only_named': True}, ['knee']),
     ('klann', {'joint_names': ['crank=motor'], 'only_named': True}, ['motor'])])
-def test_joints_by_default(linkage, given, chosen):
-    assert [each.name for each in joints(alone(linkage, **given))] == chosen
+def test_joints_by_default(linkage, parameters, chosen):
+    assert [each.name for each in joints(alone(linkage, **parameters))] == chosen
 
 
 def test_the_joints_are_chosen_by_their_names(mechanisms):
@@ -465,11 +466,11 @@ def test_joint_limits_are_those_of_all_poses(capsys, path):
     limits, rng = limits_of(capsys, ROOT / path), np.random.default_rng(9)
     for mechanism in scene.load(ROOT / path).mechanisms.values():
         # What the joints are at poses of the sweeps, by another way than that of the limits.
-        given = [rng.uniform(*(drive.ends or drive.reach[0]), 3000) / mechanism.scale_of(name)
-                 for name, drive in mechanism.inputs.items()]
+        inputs = [rng.uniform(*(settings.ends or settings.reach[0]), 3000) / mechanism.scale_of(
+            name) for name, settings in mechanism.inputs.items()]
         for axis in joints(mechanism):
             values = axis.factor * mechanism.linkage.joint_angles(
-                given if len(given) > 1 else given[0], [axis.output])[axis.output] + axis.offset
+                inputs if len(inputs) > 1 else inputs[0], [axis.output])[axis.output] + axis.offset
             low, high = limits[axis.name]
             slack = 0.05 * (high - low)
             assert low - 1e-9 <= np.nanmin(values) <= low + slack

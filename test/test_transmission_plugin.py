@@ -306,9 +306,9 @@ def test_a_robot_has_its_own_gears_and_encoder_zeros(plugins):
             plugins.mechanisms['leg'], 1.9, 1.24))):
         values = np.array([position, [0.3, -0.2], [2.0, 5.0]])
         _, seen = getattr(plain, call)(*values)
-        status, found = getattr(geared, call)(*of_robot(values, side))
+        status, written = getattr(geared, call)(*of_robot(values, side))
         assert status == OK
-        np.testing.assert_allclose(found, of_robot(seen, 1 - side), rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(written, of_robot(seen, 1 - side), rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize('name', ['knee', 'leg', 'lever'])

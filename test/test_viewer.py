@@ -179,8 +179,8 @@ def test_nodes_that_come_later_or_in_a_namespace_are_waited_for_and_not_guessed(
     page = running.page()
     assert [page.ask(op, key='/leg')['reason'] for op in ('pose', 'tune', 'curve')] == [
         "there is no mechanism '/leg'"] * 3
-    given = {**LEG, 'leg.scale': 0.5, 'leg.frame_id': 'bench'}
-    running.nodes.extend(graph.start(kind, given, namespace=space)
+    parameters = {**LEG, 'leg.scale': 0.5, 'leg.frame_id': 'bench'}
+    running.nodes.extend(graph.start(kind, parameters, namespace=space)
                          for kind in NODES for space in ('', 'robots/left'))
     page.mechanisms('/leg', '/robots/left/leg')
     g_x = 0.5 * mechanisms.create('jansen').solve(1.0, ('G',))['G'][0]

@@ -31,27 +31,27 @@ def mechanism_of(name, **changed):
     key, = values['mechanisms']
     mechanism, = scene.read({**values, **{
         f'{key}.{name}': value for name, value in changed.items()}}).mechanisms.values()
-    return mechanism, [drive.start for drive in mechanism.inputs.values()]
+    return mechanism, [settings.start for settings in mechanism.inputs.values()]
 
 
 @pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)
 def test_the_page_is_told_what_it_draws_and_moves(path):
     for mechanism in scene.load(str(path)).mechanisms.values():
-        told = json.loads(json.dumps(poses.drawn(
+        drawn = json.loads(json.dumps(poses.drawn(
             mechanism, dict.fromkeys(mechanism.inputs, 2.5)), allow_nan=False))
         legs = mechanism.assembly().legs
-        assert len(told['legs']) == len(legs) and told['legs'][-1] + 1 == sum(
+        assert len(drawn['legs']) == len(legs) and drawn['legs'][-1] + 1 == sum(
             leg.side > 0 for leg in legs.values())
-        assert told['space'] == (mechanism.linkage.type == 'rods')
-        assert told['points'] == list(mechanism.points)
-        assert told['sides'].keys() == mechanism.linkage.branches.keys()
-        assert told['inputs'].keys() == mechanism.inputs.keys()
-        start = [drive.start for drive in mechanism.inputs.values()]
-        for i, (key, drive) in enumerate(mechanism.inputs.items()):
-            about = told['inputs'][key]
-            assert (about['speed'], about['unit']) == (2.5, drive.input.unit)
-            assert about['ends'] == [drive.arcs[0][0], drive.arcs[-1][1]]
-            assert (about['turn'] is not None) == drive.input.is_angle
+        assert drawn['space'] == (mechanism.linkage.type == 'rods')
+        assert drawn['points'] == list(mechanism.points)
+        assert drawn['sides'].keys() == mechanism.linkage.branches.keys()
+        assert drawn['inputs'].keys() == mechanism.inputs.keys()
+        start = [settings.start for settings in mechanism.inputs.values()]
+        for i, (key, settings) in enumerate(mechanism.inputs.items()):
+            about = drawn['inputs'][key]
+            assert (about['speed'], about['unit']) == (2.5, settings.input.unit)
+            assert about['ends'] == [settings.arcs[0][0], settings.arcs[-1][1]]
+            assert (about['turn'] is not None) == settings.input.is_angle
             other = [value + (about['turn'] or 0.0) * (j == i) for j, value in enumerate(start)]
             after = mechanism.linkage.solve(theta_of(other))
             for joint, place in mechanism.linkage.solve(theta_of(start)).items():
@@ -134,12 +134,12 @@ def test_arrows_are_how_the_joints_move_in_the_picture(name, kind):
         solved = mechanism.linkage.solve(theta_of(own))
         return {joint: mechanism.scale * place for joint, place in solved.items()}
 
-    found, h = poses.arrows(mechanism, starts, kind, speeds), 1e-4
+    arrows, h = poses.arrows(mechanism, starts, kind, speeds), 1e-4
     before, now, after = map(places, (-h, 0.0, h))
-    assert found.keys() == {'unit', 'at'}
-    assert found['unit'] == {'velocity': 'm/s', 'acceleration': 'm/s²'}[kind]
-    assert set(found['at']) == set(mechanism.linkage.points) - set(mechanism.linkage.grounded)
-    for joint, arrow in found['at'].items():
+    assert arrows.keys() == {'unit', 'at'}
+    assert arrows['unit'] == {'velocity': 'm/s', 'acceleration': 'm/s²'}[kind]
+    assert set(arrows['at']) == set(mechanism.linkage.points) - set(mechanism.linkage.grounded)
+    for joint, arrow in arrows['at'].items():
         slope = ((after[joint] - before[joint]) / (2.0 * h) if kind == 'velocity' else
                  (after[joint] - 2.0 * now[joint] + before[joint]) / h ** 2)
         assert arrow == pytest.approx(slope, rel=1e-4, abs=1e-6)
@@ -157,8 +157,8 @@ def test_an_input_goes_where_it_is_wanted_or_as_near_as_it_gets(
         name, input_, value, expected, reach):
     mechanism, present = (mechanism_of('excavator', **DOUBLE) if name == 'twice'
                           else mechanism_of(name))
-    found, missed = poses.reached(mechanism, present, {'output': input_, 'value': value})
-    assert dict(zip(mechanism.inputs, found)) == pytest.approx(
+    inputs, missed = poses.reached(mechanism, present, {'output': input_, 'value': value})
+    assert dict(zip(mechanism.inputs, inputs)) == pytest.approx(
         {**dict(zip(mechanism.inputs, present)), input_: expected}, rel=1e-15)
     assert missed == (reach and {'name': input_, 'arcs': (reach,),
                                  'unit': mechanism.inputs[input_].input.unit})
@@ -169,8 +169,8 @@ def test_an_input_goes_to_the_nearest_of_two_arcs_and_not_where_nothing_can_be_a
         f'dimensions.{name}': length for name, length in zip('abcd', (3.0, 2.0, 2.5, 3.0))})
     (low, beside), (beyond, high) = bar.first.reach
     for value, expected in ((3.0, high), (-3.0, low), (3.5, low), (0.01, beyond), (-0.01, beside)):
-        (found,), reach = poses.reached(bar, [1.0], {'output': 'crank', 'value': value})
-        assert found == pytest.approx(expected, abs=1e-12) and reach['arcs'] == bar.first.reach
+        (crank,), reach = poses.reached(bar, [1.0], {'output': 'crank', 'value': value})
+        assert crank == pytest.approx(expected, abs=1e-12) and reach['arcs'] == bar.first.reach
     inside = 0.5 * (beyond + high)
     assert poses.reached(bar, [1.0], {'output': 'crank', 'value': inside}) == ([inside], None)
     five = alone('five_bar')
@@ -195,16 +195,17 @@ def test_an_output_goes_where_it_is_wanted_or_to_the_end_of_its_reach(name, chan
     ends = np.array([values.min(), values.max()])
     for part in (0.2, 0.5, 0.9):
         value = float(ends @ (1.0 - part, part))
-        found, reach = poses.reached(mechanism, present, {'output': output, 'value': value})
+        reached, reach = poses.reached(mechanism, present, {'output': output, 'value': value})
         assert reach is None
-        assert math.remainder(at(found)[0] - value, math.tau if unit == 'rad' else math.inf) == (
+        assert math.remainder(at(reached)[0] - value, math.tau if unit == 'rad' else math.inf) == (
             pytest.approx(0.0, abs=1e-9))
     for end, beyond in zip(ends.tolist(), (np.ptp(ends) * np.array([-0.2, 0.2])).tolist()):
-        found, reach = poses.reached(mechanism, present, {'output': output, 'value': end + beyond})
+        value = end + beyond
+        reached, reach = poses.reached(mechanism, present, {'output': output, 'value': value})
         assert (reach['name'], reach['unit']) == (output, unit)
         # Next to a dead point the last of the values is a little away from the end.
         np.testing.assert_allclose(np.ravel(reach['arcs']), ends, atol=3e-4 * np.ptp(ends))
-        assert math.remainder(at(found)[0] - end, math.tau if unit == 'rad' else math.inf) == (
+        assert math.remainder(at(reached)[0] - end, math.tau if unit == 'rad' else math.inf) == (
             pytest.approx(0.0, abs=3e-4 * np.ptp(ends)))
 
 
@@ -221,8 +222,8 @@ def test_a_joint_of_any_leg_goes_where_it_is_wanted_or_as_near_as_it_gets(leg):
 
     for crank in (0.4, 2.0, -1.7):
         want = {'joint': 'G', 'leg': leg, 'place': foot(np.array([crank]))[0].tolist()}
-        (found,), reach = poses.reached(walker, [crank + 0.2], want)
-        assert math.remainder(found - crank, math.tau) == pytest.approx(0.0, abs=1e-6)
+        (crank_,), reach = poses.reached(walker, [crank + 0.2], want)
+        assert math.remainder(crank_ - crank, math.tau) == pytest.approx(0.0, abs=1e-6)
         assert reach is None
 
 
@@ -233,10 +234,10 @@ def tip_of(digger, inputs):
 
 def test_a_joint_moved_by_several_inputs_goes_where_it_is_wanted_within_their_ends():
     digger, present = mechanism_of('excavator', **DOUBLE)
-    within, tip = [drive.ends for drive in digger.inputs.values()], partial(tip_of, digger)
+    within, tip = [settings.ends for settings in digger.inputs.values()], partial(tip_of, digger)
     place = tip([2.1, 2.5, 2.0]).tolist()
-    found, reach = poses.reached(digger, present, {'joint': 'T', 'place': place})
-    assert tip(found).tolist() == pytest.approx(place, abs=1e-6) and reach is None
+    inputs, reach = poses.reached(digger, present, {'joint': 'T', 'place': place})
+    assert tip(inputs).tolist() == pytest.approx(place, abs=1e-6) and reach is None
     far = poses.reached(digger, present, {'joint': 'T', 'place': [99.0, 0.0]})[0]
     assert all(low <= value <= high for value, (low, high) in zip(far, within))
     assert tip(far)[0] > max(tip(corner)[0] for corner in itertools.product(*within)) - 1e-6
@@ -245,16 +246,16 @@ def test_a_joint_moved_by_several_inputs_goes_where_it_is_wanted_within_their_en
 @pytest.mark.nightly
 def test_hardly_any_pose_of_a_grid_is_nearer_to_where_several_inputs_move_a_joint():
     digger, _ = mechanism_of('excavator', **DOUBLE)
-    within = [drive.ends for drive in digger.inputs.values()]
+    within = [settings.ends for settings in digger.inputs.values()]
     (low, high), rng = np.transpose(within), np.random.default_rng(1)
     grid = np.stack(np.meshgrid(*np.linspace(low, high, 41).T)).reshape(3, -1)
     reached = tip_of(digger, [*grid])
     worse = 0
     for want in np.nanmean(reached, axis=0) + rng.normal(size=(60, 2)) * 8.0:
         start = rng.uniform(low, high).tolist()
-        found, _ = poses.reached(digger, start, {'joint': 'T', 'place': want.tolist()})
+        inputs, _ = poses.reached(digger, start, {'joint': 'T', 'place': want.tolist()})
         nearest = np.nanmin(np.hypot(*(reached - want).T))
-        worse += math.dist(tip_of(digger, found), want) > nearest + 0.02
+        worse += math.dist(tip_of(digger, inputs), want) > nearest + 0.02
     assert worse < 8
 
 
@@ -292,21 +293,21 @@ def test_what_cannot_be_assembled_is_not_dragged():
 
 def test_a_pose_of_several_inputs_is_described_whole():
     digger, present = mechanism_of('excavator', **DOUBLE)
-    found, linkage = poses.described(digger, present), digger.linkage
+    described, linkage = poses.described(digger, present), digger.linkage
 
     def at(inputs):
-        angles = linkage.joint_angles(np.divide(inputs, 2.0), list(found['outputs']))
+        angles = linkage.joint_angles(np.divide(inputs, 2.0), list(described['outputs']))
         return {name: value * (1.0 if linkage.is_angle(name) else 2.0)
                 for name, value in angles.items()}
 
-    assert found.keys() == {'inputs', 'outputs'}
-    assert found['inputs'] == dict(zip(digger.inputs, present))
-    assert list(found['outputs']) == [
+    assert described.keys() == {'inputs', 'outputs'}
+    assert described['inputs'] == dict(zip(digger.inputs, present))
+    assert list(described['outputs']) == [
         *(joint for joint in linkage.joints if joint not in digger.inputs), 'T.x', 'T.y']
     truth, h = at(present), 1e-6
     slopes = [[(at(np.add(present, step))[name] - at(np.subtract(present, step))[name]) / (2 * h)
                for step in h * np.eye(3)] for name in truth]
-    for (name, about), slope in zip(found['outputs'].items(), slopes):
+    for (name, about), slope in zip(described['outputs'].items(), slopes):
         assert about == {'value': pytest.approx(float(truth[name])),
                          'unit': 'rad' if linkage.is_angle(name) else 'm',
                          'rates': pytest.approx(slope, rel=1e-6, abs=1e-8)}
@@ -326,9 +327,9 @@ def test_an_output_is_what_it_is_however_small_and_rounding_is_zero(scale):
 
 def test_arrows_of_force_are_the_loads_and_what_holds_them():
     mechanism = alone('slotted_lever', loads=['L=3 -4', 'lever=2'])
-    found = poses.arrows(mechanism, [0.5], 'force', {'crank': 1.0})
+    drawn = poses.arrows(mechanism, [0.5], 'force', {'crank': 1.0})
     effort, = mechanism.efforts([0.5])
-    assert found == {'unit': 'N', 'at': {'L': (3.0, -4.0)}, 'efforts': {'crank': [effort, 'N·m']}}
+    assert drawn == {'unit': 'N', 'at': {'L': (3.0, -4.0)}, 'efforts': {'crank': [effort, 'N·m']}}
     digger, present = mechanism_of('excavator')
     assert poses.arrows(digger, present, 'force', {}) == {'unit': 'N', 'at': {}, 'efforts': {}}
     loaded = dataclasses.replace(digger, loads={'T': (0.0, -9.0)})

@@ -24,13 +24,13 @@ def work(monkeypatch):
     done = Counter()
     make = LegGroup.solution
 
-    def counted(assembly, *wanted):
-        solution = make(assembly, *wanted)
+    def counted(assembly, *names):
+        solution = make(assembly, *names)
         solve = solution.solve
 
-        def run(*drive):
-            done[(assembly.linkage.type, *(len(part or ()) for part in wanted[:3]))] += 1
-            return solve(*drive)
+        def run(*inputs):
+            done[(assembly.linkage.type, *(len(part or ()) for part in names[:3]))] += 1
+            return solve(*inputs)
 
         solution.solve = run
         return solution
@@ -81,9 +81,9 @@ def test_the_locus_is_sent_once_and_a_late_subscriber_gets_it(graph):
     node = graph.start(Kinematics)
     early, other = (graph.listen(Marker, f'{name}/locus', LATCHED)
                     for name in ('jansen', 'slotted_lever'))
-    turn, heard = graph.crank(CRANKS), graph.listen(MarkerArray, 'jansen/markers')
+    turn, messages = graph.crank(CRANKS), graph.listen(MarkerArray, 'jansen/markers')
     for theta in (0.1, 0.2, 0.3):
-        turn([theta] * 4, heard)
+        turn([theta] * 4, messages)
     late = graph.listen(Marker, 'jansen/locus', LATCHED)
     graph.until(lambda: late and other)
     assert graph.set(node, slotted_lever__dimensions__a=81.0).successful

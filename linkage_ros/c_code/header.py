@@ -108,7 +108,7 @@ def _inverses(mechanism: SceneMechanism, texts: Sequence[str]) -> dict[str, list
     """Return the axes of each inverse, by the end of its name."""
     outputs, n = [*map(plain_text, texts)], len(mechanism.inputs)
     for output in outputs:
-        mechanism.linkage.check_output(output)
+        mechanism.linkage.check_there(output)
     if outputs and n > 1 and len(outputs) != n:
         raise ValueError(f'{mechanism.name} has {n_inputs(n)}: as many outputs are needed, '
                          f'got {join_names(outputs)}')

@@ -22,11 +22,12 @@ def case(lines, dimensions):
 
 def shipped(name):
     """Return the `Design` of the one mechanism of an example."""
-    given = example(name)
-    key, = given['mechanisms']
+    parameters = example(name)
+    key, = parameters['mechanisms']
     start = f'{key}.dimensions.'
-    return Design(given[f'{key}.joints'], {name.removeprefix(start): value for name, value
-                                           in given.items() if name.startswith(start)}, {})
+    return Design(parameters[f'{key}.joints'], {
+        name.removeprefix(start): value for name, value in parameters.items()
+        if name.startswith(start)}, {})
 
 
 # An excavator's idler stands so far from the ground bar when its piston is at zero [rad].

@@ -288,21 +288,21 @@ class Linkage:
 
     def _driven(self):
         """Return for each input or geared line the name that its input has."""
-        found = {}
+        driven = {}
         for i, line in enumerate(self.lines):
             if line.word in _INPUTS:
                 before = sum(self.lines[k].word == line.word and not self.lines[k].called
-                             for k in found)
-                found[i] = line.called or (f'{line.word}{before + 1}' if before else line.word)
-        return found
+                             for k in driven)
+                driven[i] = line.called or (f'{line.word}{before + 1}' if before else line.word)
+        return driven
 
     def driven(self, rows, values):
         """Return the angle or length that drives each line, from the values of the inputs."""
-        values, found = iter(values), {}
+        values, angles = iter(values), {}
         for i, name in self._drives.items():
             geared = self.lines[i].geared
-            found[name] = rows[i][-2] * found[geared] + rows[i][-1] if geared else next(values)
-        return {i: found[name] for i, name in self._drives.items()}
+            angles[name] = rows[i][-2] * angles[geared] + rows[i][-1] if geared else next(values)
+        return {i: angles[name] for i, name in self._drives.items()}
 
     def geared(self, rows, values):
         """Return (line, slack) of what is geared: half an ulp of the product and of the sum."""

@@ -114,7 +114,7 @@ class Row(NamedTuple):
 
 def outputs(linkage, links):
     """Return all outputs of a pose, given a mechanism's links."""
-    found = [Output('point', name, ((name,),), linkage.closures[name]) for name in linkage.placed]
+    points = [Output('point', name, ((name,),), linkage.closures[name]) for name in linkage.placed]
     slides = iter(line.names[0] for line in linkage.lines if line.word in SLIDING)
     bars = {}
     for link in links:
@@ -127,15 +127,15 @@ def outputs(linkage, links):
         if link.name in linkage.driven_names:  # it is as given, but for a carriage beyond its way
             tip = bars[link.name][0]
             needs = {tip} if linkage.placing(tip).word == 'carriage' else set()
-        found.append(Output(
+        points.append(Output(
             'slide' if slides_on else 'angle', link.name, parts, frozenset(needs),
             0 if zero or slides_on else round(link.zero / (math.pi / 2))))
-    return found
+    return points
 
 
 def answers(mechanism, values, poses, rates=False, motion=None):
     """Return {output: array} of a mechanism at values of its inputs, shape (n, inputs)."""
-    given, found = theta_of(values.T), {}
+    given, results = theta_of(values.T), {}
     asked = [(None, mechanism.solve(given), mechanism.joint_angles(given))]
     for by in range(len(mechanism.inputs) if rates else 0):
         asked.append((by, mechanism.velocity(given, by=by), mechanism.joint_rates(given, by=by)))
@@ -144,9 +144,9 @@ def answers(mechanism, values, poses, rates=False, motion=None):
         asked.append((TIME, mechanism.acceleration(*moving),
                       mechanism.joint_accelerations(*moving)))
     for by, points, angles in asked:
-        found.update((out._replace(by=by),
-                      (points if out.what == 'point' else angles)[out.name]) for out in poses)
-    return found
+        results.update((out._replace(by=by),
+                        (points if out.what == 'point' else angles)[out.name]) for out in poses)
+    return results
 
 
 def differentiated(poses, inputs, rates, motion):
@@ -445,15 +445,15 @@ def _change(before, now, after, order):
 
 
 @precisely
-def judge(measure, given, found, rates=False, exact=None, motion=None):
+def judge(measure, given, results, rates=False, exact=None, motion=None):
     """Return the `Row` of each output that is found, at inputs of the shape (n, inputs)."""
     rows = []
     for index, row in enumerate(given):
         truth = exact[index] if exact else measure.at(row, rates, motion)
         outs = differentiated(measure.poses, len(row), rates, motion)
         for i, out in enumerate(outs):
-            if out in found:
-                rows.append(_row(out, row, found[out][index], truth.values[i],
+            if out in results:
+                rows.append(_row(out, row, results[out][index], truth.values[i],
                                  truth.sensitivity[i], measure.due(out, truth.states),
                                  *measure.rule(out)))
     return rows

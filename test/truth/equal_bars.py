@@ -78,32 +78,32 @@ def limited(subject):
     answers = drawing_accuracy.answers(
         mechanism, np.array([[value, *subject.held] for value in values]), poses)
     for i, value in enumerate(values.tolist()):
-        given = [value, *subject.held] if subject.held else value
-        angles = mechanism.joint_angles(given)
-        alone = {'point': mechanism.solve(given), 'angle': angles, 'slide': angles}
-        near = limits(subject, value)
-        sides = [side for side in (near.before, near.after) if side]
+        inputs = [value, *subject.held] if subject.held else value
+        angles = mechanism.joint_angles(inputs)
+        alone = {'point': mechanism.solve(inputs), 'angle': angles, 'slide': angles}
+        limits_ = limits(subject, value)
+        sides = [side for side in (limits_.before, limits_.after) if side]
         for k, out in enumerate(poses):
-            found, single = answers[out][i], alone[out.what][out.name]
+            result, single = answers[out][i], alone[out.what][out.name]
             unit = mechanism.longest if out.what != 'angle' else 1.0
-            text = f'{out} at {value!r} is {found}'
-            if np.isinf(found).any() or np.isinf(single).any():
+            text = f'{out} at {value!r} is {result}'
+            if np.isinf(result).any() or np.isinf(single).any():
                 yield 'infinite', text
-            if not np.array_equal(np.isnan(found), np.isnan(single)):
+            if not np.array_equal(np.isnan(result), np.isnan(single)):
                 yield 'in an array only', f'{single}, {text}'
-            hung = near.vanishing & out.needs
+            hung = limits_.vanishing & out.needs
             if not hung or len(sides) < 2 or not all(
                     linkage.half_angles[linkage.lines.index(linkage.placing(name))]
                     for name in hung):
                 continue
-            agree = near.agree(k, unit)
+            agree = limits_.agree(k, unit)
             # A joint is nowhere if one that it stands on is.
-            whole = all(near.agree(n, mechanism.longest) for n, each in enumerate(poses)
+            whole = all(limits_.agree(n, mechanism.longest) for n, each in enumerate(poses)
                         if each.what == 'point' and each.needs <= out.needs)
-            if np.isnan(found).any():
+            if np.isnan(result).any():
                 if agree and whole:
                     yield 'no limit', f'{text}, not {complex(sides[0][k])}'
-            elif min(map(precisely(partial(error_of, out, found)), (
+            elif min(map(precisely(partial(error_of, out, result)), (
                     side[k] for side in sides))) > CLOSE * unit:
                 yield 'wrong', f'{text}, not {complex(sides[0][k])}'
             elif not agree and value == 0.0:

@@ -58,19 +58,20 @@ def dimensions(kind, rng):
     rarely too short to reach, 2 r being at least about |a - b|.
     """
     size = log_uniform(rng, 0.01, 1.0)
-    found = {name: size * length * float(rng.uniform(0.65, 1.35)) if kind == 'jansen'
-             else log_uniform(rng, 0.1, 10.0) for name, length in CATALOGUE[kind][0].items()}
+    lengths = {name: size * length * float(rng.uniform(0.65, 1.35)) if kind == 'jansen'
+               else log_uniform(rng, 0.1, 10.0) for name, length in CATALOGUE[kind][0].items()}
     if kind == 'peaucellier':
-        found['r'] = max(found['r'], abs(found['a'] - found['b']) * log_uniform(rng, 0.45, 2.0))
+        least = abs(lengths['a'] - lengths['b']) * log_uniform(rng, 0.45, 2.0)
+        lengths['r'] = max(lengths['r'], least)
     if kind == 'slotted_lever':
-        found['e'] *= float(rng.choice((-1.0, 0.0, 1.0)))
+        lengths['e'] *= float(rng.choice((-1.0, 0.0, 1.0)))
     if DEGENERATE[kind] and rng.random() < 0.3:
         name, _, length = str(rng.choice(DEGENERATE[kind])).partition('=')
-        value = eval(length, {**found, 'hypot': math.hypot})
+        value = eval(length, {**lengths, 'hypot': math.hypot})
         near = tiny(rng, 1e-13, 0.0) if kind == 'jansen' else tiny(rng)
         if value > 0.0 or name == 'e':
-            found[name] = value * (1.0 + near)
-    return found
+            lengths[name] = value * (1.0 + near)
+    return lengths
 
 
 def linkages(kind, seed, count):

@@ -150,12 +150,12 @@ class Output:
 
 def judge(linkage, name, rng, count=6, others=()):
     """Return counts by (kind, what), and the worst error of an answer in units of the rule."""
-    output, found, worst = Output(linkage, name, others), Counter(), 0.0
+    output, counter, worst = Output(linkage, name, others), Counter(), 0.0
     steps = output.away(output.values[1:], output.values[:-1])
     steps = steps[np.isfinite(steps)]
     # An output that stands still at most places tells no input.
     if len(steps) < 20 or np.median(steps) < 1e-9 * output.size:
-        return found, worst
+        return counter, worst
     names = (name, *(input_.name for input_ in linkage.inputs[1:]))
     inverse, reach = linkage.inverse(names), linkage.reach(*others)
     first = inverse.inputs[0]
@@ -173,7 +173,7 @@ def judge(linkage, name, rng, count=6, others=()):
             kind = 'no direction'
         elif 'ends' in kind and not output.first.on(reach, at):
             kind = 'beyond the reach'
-        found[kind, 'questions'] += 1
+        counter[kind, 'questions'] += 1
         expected = [at]
         if kind == 'ordinary':
             # Of a part of a period, a quarter on both sides of the seed is promised.
@@ -188,27 +188,27 @@ def judge(linkage, name, rng, count=6, others=()):
                     # Where the output hardly changes, its value does not tell the input.
                     gap < 1e-2 and output.away(output.at(np.linspace(root, x, 9)), value).max()
                     < 1e-11 * output.size for gap, x in zip(gaps, answers)):
-                _note(found, kind, 'lost', linkage, name, at, others)
+                _note(counter, kind, 'lost', linkage, name, at, others)
                 break
         for k, x in enumerate(answers):
             error, reached, beside = _error(
                 output.held_at(solutions[k].inputs[1:]), first, x, value)
             beyond = 0.0 if kind == 'ordinary' else max(2.0 * ALLOWED * output.size, beside)
             if not error <= MOST and not output.away(reached, value) <= beyond:
-                _note(found, kind, 'invented', linkage, name, at, others)
+                _note(counter, kind, 'invented', linkage, name, at, others)
             elif kind == 'ordinary':
                 worst = max(worst, error)
             # Two that are near are one if the output has its value between them, too.
             if any(first.distance(x, y) <= 1e-9 * first.size and output.away(
                     output.at(x + 0.5 * math.remainder(y - x, first.turn)), value)
                     <= MOST * 2.0 ** -53 * output.size for y in answers[:k]):
-                _note(found, kind, 'duplicates', linkage, name, at, others)
-    return found, worst
+                _note(counter, kind, 'duplicates', linkage, name, at, others)
+    return counter, worst
 
 
-def _note(found, kind, what, *where):
+def _note(counter, kind, what, *where):
     """Count what is wrong, and where it was."""
-    found.update([(kind, what), (kind, f'{what} at', *where)])
+    counter.update([(kind, what), (kind, f'{what} at', *where)])
 
 
 def _error(output, first, x, value):
@@ -228,7 +228,7 @@ def _error(output, first, x, value):
 
 def judge_several(linkage, names, rng, count=6):
     """Return what `judge` does for as many outputs as there are inputs, at ordinary poses."""
-    found, inverse = Counter(), linkage.inverse(names)
+    counter, inverse = Counter(), linkage.inverse(names)
     sizes = [input_.size for input_ in linkage.inputs]
     scales = [1.0 if linkage.is_angle(name) else linkage.longest for name in names]
     poses = [[float(rng.uniform(input_.low, input_.high)) for input_ in linkage.inputs]
@@ -239,17 +239,17 @@ def judge_several(linkage, names, rng, count=6):
     for pose in regular[:count]:
         row = np.array(checked.at(*pose)[:len(names)])
         answers = inverse.all(row.tolist())
-        found['ordinary', 'questions'] += 1
+        counter['ordinary', 'questions'] += 1
         margin = Solution(pose, inverse).margin
         if not any(max(input_.distance(x, y) / size for input_, x, y, size in zip(
                 inverse.inputs, answer.inputs, pose, sizes)) < 1e-9 / margin
                 for answer in answers):
-            _note(found, 'ordinary', 'lost', linkage, names, tuple(pose), ())
+            _note(counter, 'ordinary', 'lost', linkage, names, tuple(pose), ())
         for answer in answers:
             there = np.array(checked.at(*answer.inputs)[:len(names)])
             if _differ(inverse, there - row, scales):
-                _note(found, 'ordinary', 'invented', linkage, names, tuple(pose), ())
-    return found, 0.0
+                _note(counter, 'ordinary', 'invented', linkage, names, tuple(pose), ())
+    return counter, 0.0
 
 
 def _differ(inverse, gaps, scales):

@@ -74,12 +74,12 @@ class Subject:
 
     def fitted(self, given, rates=False, mechanism=None, motion=None):
         """Measure all answers, on the way past the change points that fits them best."""
-        found = drawing_accuracy.answers(mechanism or self.mechanism, given, self.poses, rates,
-                                         motion)
+        results = drawing_accuracy.answers(mechanism or self.mechanism, given, self.poses, rates,
+                                           motion)
         best = None
         for way in self.ways:
             measure = drawing_accuracy.Measure(self.linkage, self.poses, way)
-            rows = drawing_accuracy.judge(measure, given, found, rates, motion=motion)
+            rows = drawing_accuracy.judge(measure, given, results, rates, motion=motion)
             count = sum(bool(row.problem) for row in rows)
             if best is None or count < best[0]:
                 best = count, rows
@@ -93,8 +93,8 @@ class Subject:
                                  self.rng.uniform(input_.low, input_.high, 60)
                                  for input_ in self.inputs])
         drawing, unit = self._drawn(list(given.T), way)
-        found, count = self.mechanism.solve(_given(given, (60,))), 0
-        for name, place in found.items():
+        places, count = self.mechanism.solve(_given(given, (60,))), 0
+        for name, place in places.items():
             count += np.sum(np.abs(place @ (1, 1j) / unit - drawing.points[name]) > 1e-6)
         return count
 
@@ -179,9 +179,9 @@ def checked(check):
 def spots(subject):
     """Return dead points and reach ends, as far as they can be had."""
     found = []
-    for ask in (subject.mechanism.reach, subject.mechanism.dead_points):
+    for method in (subject.mechanism.reach, subject.mechanism.dead_points):
         try:
-            found += np.ravel(ask(*subject.held)).tolist()
+            found += np.ravel(method(*subject.held)).tolist()
         except Exception:  # noqa: B902
             continue  # `reach` and `dead_points` have a check of their own
     return found
@@ -255,15 +255,15 @@ def forms(subject):
                     yield 'forms differ', (f'{name} at {row.tolist()} is {value[pick]} in shape '
                                            f'{shape}, {whole[name][index]} in an array')
         joints = mechanism.joints
-        wanted = [*(part for name in mechanism.points for part in whole[f'solve {name}'][index]),
-                  *(whole[f'joint_angles {name}'][index] for name in joints),
-                  *(whole[f'joint_rates {name} {by}'][index]
-                    for by in range(len(subject.inputs)) for name in joints)]
+        expected = [*(part for name in mechanism.points for part in whole[f'solve {name}'][index]),
+                    *(whole[f'joint_angles {name}'][index] for name in joints),
+                    *(whole[f'joint_rates {name} {by}'][index]
+                      for by in range(len(subject.inputs)) for name in joints)]
         names = [*(f'solve {name}' for name in mechanism.points for _ in 'xy'),
                  *(f'joint_angles {name}' for name in joints),
                  *(f'joint_rates {name}' for _ in subject.inputs for name in joints)]
-        found = mechanism.function(None, joints, joints)(*map(float, row))
-        for name, one, other in zip(names, found, wanted):
+        floats = mechanism.function(None, joints, joints)(*map(float, row))
+        for name, one, other in zip(names, floats, expected):
             if not _same(name, one, other):
                 yield 'function() differs', f'{name} at {row.tolist()} is {one}, not {other}'
                 break
@@ -283,13 +283,13 @@ def _given(given, shape):
 
 def _all(mechanism, given):
     found = {}
-    for ask in ('solve', 'joint_angles', 'transmission_angles'):
-        answers = getattr(mechanism, ask)(given)
-        found.update((f'{ask} {name}', np.asarray(value)) for name, value in answers.items())
+    for method in ('solve', 'joint_angles', 'transmission_angles'):
+        answers = getattr(mechanism, method)(given)
+        found.update((f'{method} {name}', np.asarray(value)) for name, value in answers.items())
     for by in range(len(mechanism.inputs)):
-        for ask in ('velocity', 'joint_rates'):
-            answers = getattr(mechanism, ask)(given, by=by)
-            found.update((f'{ask} {name} {by}', np.asarray(value))
+        for method in ('velocity', 'joint_rates'):
+            answers = getattr(mechanism, method)(given, by=by)
+            found.update((f'{method} {name} {by}', np.asarray(value))
                          for name, value in answers.items())
     return found
 
@@ -480,13 +480,13 @@ def followed(subject):
             return float(mechanism.joint_angles(given, [output])[output])
 
         for near in rng.choice(subject.values, 10).tolist():
-            wanted = value(near) + rng.uniform(-0.2, 0.2) * scale
-            found, _ = mechanism.inverse(names).follow(
-                (wanted, *subject.held), (near, *subject.held))
-            gap = value(found[0]) - wanted if math.isfinite(found[0]) else 0.0
+            target = value(near) + rng.uniform(-0.2, 0.2) * scale
+            inputs, _ = mechanism.inverse(names).follow(
+                (target, *subject.held), (near, *subject.held))
+            gap = value(inputs[0]) - target if math.isfinite(inputs[0]) else 0.0
             gap = math.remainder(gap, math.tau) if mechanism.is_angle(output) else gap
             if not abs(gap) < 1e-6 * scale:
-                yield 'followed', f'{output} to {wanted!r} from {near!r}: {found} is {gap} off'
+                yield 'followed', f'{output} to {target!r} from {near!r}: {inputs} is {gap} off'
 
 
 # --- forces -------------------------------------------------------------------------------------
@@ -509,10 +509,10 @@ def efforts(subject):
              for by in range(len(mechanism.inputs))]
     # The rule says nothing of arms of nearly no length.
     sure = [by for by, row in enumerate(rates) if (np.abs([*row.values()]) < 1e9).all()]
-    found = mechanism.effort(given, loads)[sure]
-    wanted = [-sum(rates[by][output] * load for output, load in moved) for by in sure]
-    if not np.allclose(found, wanted, 1e-6, 1e-8 * max(1.0, mechanism.longest)):
-        yield 'effort', f'{found}, not {wanted}, for {loads}, {given}'
+    effort = mechanism.effort(given, loads)[sure]
+    expected = [-sum(rates[by][output] * load for output, load in moved) for by in sure]
+    if not np.allclose(effort, expected, 1e-6, 1e-8 * max(1.0, mechanism.longest)):
+        yield 'effort', f'{effort}, not {expected}, for {loads}, {given}'
 
 
 CHECKS = poses, rates, accelerations, forms, reach, dead_points, inverse, followed, efforts
