@@ -435,8 +435,11 @@ def test_an_end_of_the_reach_is_within_it_any_turn_and_nothing_beyond_is():
 
 def test_the_locus_is_that_of_the_tracer_or_last_point_on_the_widest_arc():
     assert [alone('jansen', points=[*names]).tracer for names in ('GA', 'BA')] == ['G', 'A']
-    legs = LegGroup(mechanisms.create('four_bar'), reach=[(0.0, 0.1), (1.0, 2.0), (3.0, 3.5)])
-    assert np.angle(legs.locus('A')[[0, -1]] @ (1.0, 1j)) == approx([1.0, 2.0])
+    legs = LegGroup(mechanisms.create('custom', joints=[
+        'O ground 0 0', 'Q ground 1.2 0', 'F ground 0.7 1.4', 'A crank O 0.6',
+        'B dyad A Q 1.9 0.9 left', 'C dyad B F 0.4 1.2 left']))
+    _, widest = legs.reach
+    assert np.angle(legs.locus('A')[[0, -1]] @ (1.0, 1j)) == approx(widest)
 
 
 @pytest.mark.parametrize('turns', [True, False])
