@@ -57,7 +57,7 @@ def _started(context):
         file.write_text(in_yaml(rest))
         files.append(str(file))
     text = ParameterValue(readers.description(chosen['robot'], robot), value_type=str)
-    reports = [LogInfo(msg=f'robot.launch.py: {cli.not_published(lost)}')] * bool(lost)
+    reports = [LogInfo(msg=f'robot.launch.py: {line}') for line in lost]
     is_simulated = IfCondition(LaunchConfiguration('simulated')).evaluate(context)
     nodes = ('kinematics', 'crank_driver') if is_simulated else ('kinematics',)
     return [*reports,

@@ -99,7 +99,12 @@ REFUSED = [
     ('four_bar.xml', [('<worldbody>', '<include file="floor.xml"/><worldbody>')],
      "four_bar.xml cannot be read: XML Error: Error opening file 'floor.xml'"),
     ('four_bar.urdf', [], 'replace them by --driven motor in the', '--driven', 'motor', 'elbow'),
+    # Where it is open by rounding, too.
+    ('four_bar.urdf', [('"coupler" xyz="0.3 0 0"', '"coupler" xyz="0.30001 0 0"')],
+     'replace them by --driven motor in the', '--driven', 'motor', 'shoulder'),
     ('four_bar.sdf', [], f'{HELD}.\n', '--hold', 'joint_A=0'),
+    *(('four_bar.sdf', [], why, '--hold', 'joint_A=0', 'joint_B=0', 'joint_C=0', f'joint_D={at}')
+      for at, why in ((0, f': {HELD}\n'), (0.1, ': its loops cannot be closed: they stay open'))),
     ('four_bar.sdf', [], 'stay open by 0.121 m', '--hold', 'joint_A=0.31', 'joint_D=-0.61'),
     ('foot.urdf', [], 'they stay open by ', '--hold', 'z_1=-0.27', 'x_0=1.23'),
     *(('whitworth.xml', [], f'{names} drive it, and hold each other, as 1 of them tell where all '
@@ -151,7 +156,10 @@ SAID = [
     # Three bodies on a pin, of which a motor turns two against each other.
     ('four_bar.sdf', [('      <pose>0 0 -0.2 0 0 0</pose>\n', '')], [], 'Checked: joint_C: '),
     # Held, it could not move.
-    ('rack.sdf', [], ['--driven', 'rack_slide'], ' must be moved: add --driven tip_motor to '),
+    ('rack.sdf', [('<joint_name>tip_motor</joint_name>', '')], [],
+     ' must be moved: add --driven tip_motor to '),
+    # Loops of which no motor is named keep those of the file.
+    ('rack.sdf', [], ['--driven', 'rack_slide'], 'Checked: tip_motor: in 240 poses'),
     # A part that nothing drives says so, beside the mechanism that is imported.
     ('wheel_leg.urdf', [], ['--driven', 'crank_motor'],
      'thigh, shin, tendon: not driven: 1 of hip, bell_joint, knee, tendon_joint must be moved'),
@@ -160,6 +168,8 @@ SAID = [
     ('four_bar.urdf', [('</robot>', '<transmission name="t"><joint name="motr"/><joint '
                         'name="motor"/></transmission></robot>')], [],
      'Not driven: motr: no joint of the file has this name; allowed: motor, elbow, shoulder; did'),
+    ('four_bar.urdf', [('</robot>', '<gazebo>' + PLUGIN.replace('joint_D', 'shoulder')
+                        + '</gazebo></robot>')], [], 'Checked: shoulder: in 240 poses'),
     # A plugin's names are those of its model.
     ('four_bar.sdf', [('<model name="four_bar">', f'<model name="m">{PLUGIN}<model name="n">'),
                       ('<link name="AB"/>', f'{PLUGIN}<link name="AB"/>'),
@@ -253,11 +263,11 @@ def test_joints_that_no_mechanism_publishes_are_one_of_cranks_where_they_are(tmp
         'mechanisms': ['others'], 'others.type': 'custom', 'others.only_named': True,
         'others.joints': ['A ground 0 0', *(f'B{i} crank A 1' for i in (1, 2, 3, 4))],
         'others.joint_names': ['crank2="k 2"-99.9'], **{
-            f'others.{crank}.{key}': value for crank, source, ratio, offset, start in (
-                ('crank', 'j', 1.0, -200.0, 0.0), ('crank2', 'j', -0.5, 100.0, 0.0),
-                ('crank3', 'l', 1.0, 0.0, 0.25), ('crank4', 'rail', 1.0, 15.0, 0.0))
+            f'others.{crank}.{key}': value for crank, source, ratio, offset in (
+                ('crank', 'j', 1.0, -200.0), ('crank2', 'j', -0.5, 100.0),
+                ('crank3', 'l', 1.0, -0.25), ('crank4', 'rail', 1.0, 15.0))
             for key, value in (('source', source), ('ratio', ratio), ('offset', offset),
-                               ('start', start), ('speed', 0.0))}}
+                               ('start', 0.0), ('speed', 0.0))}}
     robot = readers.read(str(ROBOTS / 'four_bar.sdf'))
     assert cli.others(robot, scene.read(cli.described(robot)[0]).mechanisms, {}) == ({}, [])
 

@@ -113,7 +113,7 @@ LIMITS = [
     ('four_bar.urdf', LIMIT, 'lower="nan" upper="1"', None, 'from nan to 1: they are no range'),
     ('four_bar.urdf', LIMIT, 'lower="-1e7" upper="1"', None, f'from -1e+07 to 1: {BEYOND}'),
     ('four_bar.urdf', 'name="motor" type="revolute"', 'name="motor" type="continuous"', None,
-     'from -1.2 to 1.2: it is continuous'),
+     ''),
     ('boom.urdf', 'lower="-0.3" upper="0.3"', 'lower="-inf" upper="0.2"', (-0.43633, 0.2), ''),
     ('boom.urdf', 'lower="-0.3" upper="0.3"', 'lower="5" upper="9"', None,
      f'from 5 to 9: {BEYOND}'),
@@ -472,12 +472,12 @@ def test_a_passive_joint_of_a_loop_is_no_input(tmp_path):
     robot, line = readers.read(str(spring)), said(spring)
     rest, lost = cli.others(robot, mechanisms, {})
     loop = {'spring', 'right_spring_link_joint', 'right_follower_joint'}
-    assert {*lost} == loop and not loop & {*map(str, rest.values())}
-    assert f'Not published: {", ".join(lost)}: passive joints of loops' in line
+    assert lost[0] in line and not loop & {*map(str, rest.values())}
+    assert {*lost[0].split(': ')[1].split(', ')} == loop
     assert re.search('Left out: .*right_coupler, right_spring_link, right_follower: not driven: '
                      '1 of right_spring_link_joint, .* must be moved or held: add --driven', line)
     rest, lost = cli.others(robot, mechanisms, {'spring': 0.0})
-    assert {*lost} == loop - {'spring'} and 'spring' in {*map(str, rest.values())}
+    assert 'spring,' not in lost[0] and 'spring' in {*map(str, rest.values())}
 
 
 FLAT = [f'{name}={value!r}' for name, value in (
@@ -643,7 +643,7 @@ def test_a_joint_of_the_whole_robot_that_opens_a_loop_is_named(monkeypatch):
     names = [line for line in parameters['hip.joint_names'] if 'bell' not in line]
     mechanisms = scene.read({**parameters, 'hip.joint_names': names}).mechanisms
     rest, lost = cli.others(robot, mechanisms, {})
-    assert lost == ['bell_joint'] and not rest
+    assert 'Not published: bell_joint: passive joints of loops' in lost[0] and not rest
     still, _ = cli.others(robot, mechanisms, {'bell_joint': 0.0})
     wrong = scene.read({**parameters, **still, 'hip.joint_names': names,
                         'mechanisms': ['hip', 'others']}).mechanisms

@@ -7,7 +7,7 @@ from .dyads import bar_name, Dyads, Hinge, Pin, short, Slide
 from .formulas import Leg, LinkPoint
 from .geometry.builder import GROUND, Link
 from .geometry.spatial import IN_SINGLE
-from .inputs import Arc, Input, spread, theta_of
+from .inputs import Arc, Input, spread, theta_of, wrapped
 from .inverse import Answer, Inverse, InverseLinkage, Solution
 from .mechanism import Mechanism
 from .motion.curves import ascending, extremes, sampled
@@ -25,4 +25,4 @@ __all__ = ['Answer', 'Arc', 'ascending', 'bar_name', 'checked_branches', 'checke
            'GROUND', 'Hinge', 'IN_SINGLE', 'Input', 'Inverse', 'InverseLinkage', 'joint_lines',
            'Leg', 'Link', 'LinkPoint', 'loaded_links', 'MAX_LENGTH', 'Mechanism', 'MIN_LENGTH',
            'Pin', 'reachable_arcs', 'rod_lines', 'ROUNDING', 'sampled', 'short', 'Slide',
-           'Solution', 'spread', 'theta_of', 'TOLERANCE', 'WindowError']
+           'Solution', 'spread', 'theta_of', 'TOLERANCE', 'WindowError', 'wrapped']

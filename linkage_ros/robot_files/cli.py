@@ -145,9 +145,8 @@ def _checked(robot: Robot, balls: Sequence[Sequence[str]], imported: Sequence[ch
     if wrong:
         return _checked(robot, balls, [made for made in imported if made.name not in wrong], [
             *reports, *(f'Left out: {name}: {WRONG}: {why}.' for name, why in wrong.items())])
-    reports = [*reports, *(report for made in imported for report in made.reports), *checks]
-    if lost:
-        reports.append(not_published(lost))
+    reports = [*reports, *(report for made in imported for report in made.reports), *checks,
+               *lost]
     if free := [joint.name for joint in robot.joints
                 if not joint.is_cut and joint.kind not in (HINGE, SLIDE, FIXED)]:
         reports.append(f'Not published: {", ".join(free)}: only a hinge or a slide has one '
@@ -160,7 +159,8 @@ def others(robot: Robot, mechanisms: Mapping[str, scene.SceneMechanism],
     """
     Return the parameters that add a mechanism of all joints that a scene does not publish.
 
-    Also return the joints that nothing determines: undriven ones in loops, and what follows them.
+    Also return the report on joints that nothing determines: undriven ones in loops, and what
+    follows them.
     `held` are positions of joints that stay.
     """
     held = {name: value for name, value in {**robot.held, **held}.items()
@@ -168,32 +168,26 @@ def others(robot: Robot, mechanisms: Mapping[str, scene.SceneMechanism],
     known = check.published(mechanisms)
     passive = {joint.name for component in components(closing.held(robot, held))
                for joint in component.joints}.difference(known, held, robot.driven)
-    cranks: dict[str, check.Source] = {}
-    zeros, lost = {}, []
+    drives: list[check.Source] = []
+    joints, lost = [], []
     for name in [name for name in robot.positions if name not in known]:
         source, ratio, offset = (name, 1.0, 0.0) if name in held else robot.source(name)
         if source in passive:
             lost.append(name)
             continue
         value = ratio * held.get(source, robot.positions[source]) + offset
-        # A wheel after many turns, or a long rail: inputs start near zero.
-        zeros[name] = zero = value if abs(value) > math.tau else 0.0
-        cranks[name] = check.Source(f'crank{len(cranks) + 1 if cranks else ""}', source, ratio,
-                                    offset - zero, value - zero)
-    if not cranks:
-        return {}, lost
-    lines = ['A ground 0 0', *(f'B{i} crank A 1' for i in range(1, len(cranks) + 1))]
+        # Inputs start at zero, also that of a wheel after many turns, or on a long rail.
+        crank = f'crank{len(drives) + 1 if drives else ""}'
+        drives.append(check.Source(crank, source, ratio, offset - value, 0.0))
+        joints += [(crank, 1.0, name, value)] * (source != name)
+    reports = [f'Not published: {", ".join(lost)}: passive joints of loops that no mechanism '
+               'determines. What they carry has no transform.'] * bool(lost)
+    if not drives:
+        return {}, reports
+    lines = ['A ground 0 0', *(f'B{i} crank A 1' for i in range(1, len(drives) + 1))]
     return {'mechanisms': [*mechanisms, OTHERS], **check.parameters(
-        OTHERS, 'custom', lines, [*cranks.values()],
-        [(crank.name, 1.0, name, zeros[name]) for name, crank in cranks.items()
-         if crank.source != name],
-        **{f'{crank.name}.speed': 0.0 for crank in cranks.values()})}, lost
-
-
-def not_published(names: Sequence[str]) -> str:
-    """Return the report on joints that nothing determines."""
-    return (f'Not published: {", ".join(names)}: passive joints of loops that no mechanism '
-            'determines. What they carry has no transform.')
+        OTHERS, 'custom', lines, drives, joints,
+        **{f'{drive.name}.speed': 0.0 for drive in drives})}, reports
 
 
 def positions(texts: Sequence[str]) -> dict[str, float]:

@@ -49,8 +49,7 @@ def read(path: str, loops: str | None = None) -> Robot:
         if far := [joint.name for joint in robot.joints
                    if not np.all(np.abs(joint.places) < MAX_NUMBER)]:
             raise RequestError(f'joint {far[0]} must be within {MAX_NUMBER:g} m')
-        for name in robot.follows:
-            robot.source(name)
+        robot.check_names(robot.source(name)[0] for name in robot.follows)
     return robot.cut_loops()
 
 

@@ -12,12 +12,12 @@ Poses are arrays of the screws' positions, relative to the file, a row a pose [r
 
 from __future__ import annotations
 
-import math
 from typing import Any, Iterator, Mapping, NamedTuple, Sequence
 
 import numpy as np
 
 from ..cli import RequestError
+from ..linkage import wrapped
 from ..robot_model.robot import BALL, exponentials, FIXED, FREE, HINGE, Joint, Robot, screws, SLIDE
 
 # The largest step of an iteration [rad, or of the size].
@@ -319,11 +319,6 @@ class Component:
         """Return positions of named joints [rad or m], within half a turn of the file's."""
         positions = self._starts + np.where(self._slides, poses, wrapped(poses))
         return {name: positions[..., i] for name, i in self.named.items()}
-
-
-def wrapped(angles: np.ndarray) -> np.ndarray:
-    """Return angles within half a turn of zero."""
-    return angles - math.tau * np.round(angles / math.tau)
 
 
 def is_free(motions: np.ndarray) -> np.ndarray:

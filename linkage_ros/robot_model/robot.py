@@ -17,7 +17,7 @@ from typing import Any, Collection, Iterable, Iterator, Mapping, NamedTuple, Seq
 import numpy as np
 
 from .shapes import Piece
-from ..words import did_you_mean, RequestError, suggestion
+from ..words import RequestError, suggestion
 
 HINGE, SLIDE, BALL, FIXED, UNIVERSAL, FREE = (
     'hinge', 'slide', 'ball', 'fixed', 'universal', 'free')
@@ -273,7 +273,8 @@ class Robot:
         for body in bodies:
             if body not in self.frames:
                 raise RequestError(f'joint {name} is on {body!r}, which is no link')
-        ends, no_limits = _limits(limits, kind.lower() == 'continuous')
+        is_limited = kind.lower() != 'continuous'
+        ends, no_limits = _limits(limits) if is_limited else (None, '')
         kind = KINDS.get(kind.lower(), kind.lower() or 'none')
         if kind == UNIVERSAL:
             if second is None:
@@ -331,9 +332,6 @@ class Robot:
             _, ratio, offset = sources[-1]
             name, factor, start = self.follows[name]
             sources.append((name, ratio * factor, offset + ratio * start))
-        if name not in self.positions:
-            raise RequestError(f'{passed[-1]} follows {name!r}, which is no joint'
-                               f'{did_you_mean(name, self.positions)}')
         return sources
 
     def source(self, name: str) -> tuple[str, float, float]:
@@ -388,16 +386,14 @@ def _seen(base: np.ndarray, frame: np.ndarray, magnitude: float) -> list[float]:
             *(round(angle, 15) for angle in (roll, pitch, yaw))]
 
 
-def _limits(limits: Sequence[Any], is_continuous: bool) -> tuple[tuple[float, float] | None, str]:
+def _limits(limits: Sequence[Any]) -> tuple[tuple[float, float] | None, str]:
     """Return the limits that count, None without any, and those that do not, with the reason."""
     low, high = (math.copysign(math.inf, end) if abs(end) >= MAX_NUMBER else end
                  for end in map(float, limits))
     if -low == high == math.inf:
         return None, ''
-    text = f'from {low:.4g} to {high:.4g}'
-    if is_continuous:
-        return None, f'{text}: it is continuous' if low < high else ''
-    return ((low, high), '') if low < high else (None, f'{text}: they are no range')
+    why = f'from {low:.4g} to {high:.4g}: they are no range'
+    return ((low, high), '') if low < high else (None, why)
 
 
 def with_positions(robot: Robot, values: Mapping[str, float],
