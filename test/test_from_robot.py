@@ -65,6 +65,8 @@ PIN = '{pin_loops: [{parent: coupler, child: rocker, %s: [0.3, 0, 0]}], independ
         ('{name_mot: [motr]}', "/loops.yaml: there is no hinge or slide 'motr'; allowed: motor, "),
         ('{name_mot: [7]}', "/loops.yaml: there is no hinge or slide '7'; allowed: motor, elbow"),
         ('{closed_loop: [coupler, rocker]}', '/loops.yaml: closed_loop must have pairs of '),
+        ('{closed_loop: [[coupler, rocker]], type: [3d, 3d]}', '/loops.yaml: type must have an '),
+        ('{joint_name: [elbow]}', '/loops.yaml: type must have an entry for each of closed_loop'),
         ('{name_mot: motor}', "/loops.yaml: name_mot must be a list, not 'motor'"),
         ('[]', '/loops.yaml: there is no key []; allowed: ')))])
 def test_an_option_that_cannot_be_is_named(tmp_path, file, args, why):

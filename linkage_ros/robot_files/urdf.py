@@ -23,7 +23,7 @@ from . import sdf
 from .sdf import attribute, numbers, once
 from ..cli import RequestError
 from ..robot_model.robot import at, BALL, FIXED, HINGE, pose, Robot, UNIVERSAL
-from ..words import short_repr, suggestion
+from ..words import join_names, short_repr, suggestion
 
 # The keys of a file of loops that name its motors, and all; the last two have no effect.
 _MOTORS = ('independent', 'name_mot', 'actuated_joints')
@@ -41,7 +41,7 @@ def read(root: Element) -> Robot:
     grounds = {*links} - {'world'} | {'world'}.intersection(bases.values())
     roots = [link for link in grounds if link not in joints]
     if len(roots) != 1:
-        raise RequestError(f'a URDF has one root link, not {len(roots)}')
+        raise RequestError(f'a URDF has one root link, not {join_names(roots, 200)}')
     robot = Robot(roots[0], {roots[0]: np.eye(4)})
     for link in TopologicalSorter({link: [base] for link, base in bases.items()}).static_order():
         if link in joints and link in links:
@@ -131,17 +131,22 @@ def close(robot: Robot, loops: Any) -> None:
         point = at(numbers(cut['point']))
         robot.join(f'closures[{i}]', HINGE, (cut['link_a'], cut['link_b']), point,
                    numbers(cut['axis']), point)
-    types = loops.get('type', ())
-    for i, ends in enumerate(loops.get('closed_loop', ())):
+    pairs, names, kinds = (
+        loops.get(key, ()) for key in ('closed_loop', 'joint_name', 'joint_type'))
+    types = loops.get('type', [FIXED] * len(pairs))
+    if len(pairs) != len(types) or len(names) != len(kinds):
+        raise RequestError('type must have an entry for each of closed_loop, and joint_type one '
+                           'for each of joint_name')
+    for ends, kind in zip(pairs, types):
         if not isinstance(ends, list) or len(ends) != 2:
             raise RequestError(f'closed_loop must have pairs of names, not {short_repr(ends)}')
-        _pair(robot, '='.join(ends), types[i] if i < len(types) else FIXED, ends)
+        _pair(robot, '='.join(ends), kind, ends)
     for key, kind in (('pin_loops', HINGE), ('ball_loops', BALL)):
         for i, cut in enumerate(loops.get(key, ())):
             robot.close(cut.get('name', f'{key}[{i}]'), kind, (cut['parent'], cut['child']),
                         [at(numbers(cut[f'{end}_xyz'])) for end in ('parent', 'child')],
                         numbers(cut['axis'] if kind == HINGE else '0 0 1'))
-    for name, kind in (*zip(loops.get('joint_name', ()), loops.get('joint_type', ())),
+    for name, kind in (*zip(names, kinds),
                        *((name, BALL) for name in loops.get('ball_upgrades', ()))):
         _change(robot, name, kind.lower())
     # Its motors are those of the closed robot, transmissions those of the open tree.
