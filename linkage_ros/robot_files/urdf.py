@@ -39,7 +39,7 @@ def read(root: Element) -> Robot:
     bases = {child: attribute(joint, 'parent', 'link') for child, joint in joints.items()}
     # Drake's ground needs no link, and a link of its name no joint.
     grounds = {*links} - {'world'} | {'world'}.intersection(bases.values())
-    roots = [link for link in grounds if link not in joints]
+    roots = sorted(link for link in grounds if link not in joints)
     if len(roots) != 1:
         raise RequestError(f'a URDF has one root link, not {join_names(roots, 200)}')
     robot = Robot(roots[0], {roots[0]: np.eye(4)})
