@@ -12,7 +12,6 @@ from __future__ import annotations
 from cmath import phase
 from contextlib import suppress
 from dataclasses import replace
-from itertools import combinations
 import math
 from typing import NamedTuple, Sequence
 
@@ -26,8 +25,6 @@ from ..robot_model.robot import at, BALL, coordinates, FIXED, HINGE, Joint, NotD
 
 # Kinds of joints in planar loops.
 _FLAT = (HINGE, SLIDE, BALL)
-# The most joints of which pairs are tried as motors.
-MAX_PAIRED = 30
 _OTHER = {'left': 'right', 'right': 'left', 'out': 'in', 'in': 'out'}
 
 
@@ -386,8 +383,7 @@ def _drawn(robot: Robot, group: Group) -> Drawing:
     followers = [name for name in names if name in motors + robot.followers(names)]
     tries: list[tuple[Sequence[str], str]] = [(motors, group.ground), (followers, group.ground)]
     if not robot.driven:
-        tries += ((pair, group.ground) for count in (1, 2)[:1 + (len(names) <= MAX_PAIRED)]
-                  for pair in combinations(names, count))
+        tries += (([name], group.ground) for name in names)
     # Angles between bodies are the same in the frame of a body that a motor moves.
     tries += ((motors, body) for joint in group.joints if joint.name in motors
               for body in joint.bodies if body != group.ground)
