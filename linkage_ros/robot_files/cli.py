@@ -44,7 +44,7 @@ def show(args: list[str] | None) -> None:
     # Each loop that is refused prints its own options to be added.
     parser.add_argument('--driven', metavar='JOINT', nargs='+', action='extend',
                         help='joints that motors move (default: those of the file, else any that '
-                             'determine the others)')
+                             'determines the others)')
     for option, meaning in (('pose', 'position of a joint in the pose that determines sides'),
                             ('hold', 'position at which a joint is fixed')):
         parser.add_argument(f'--{option}', metavar='JOINT=VALUE', nargs='+', action='extend',
