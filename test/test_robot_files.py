@@ -351,8 +351,9 @@ def test_a_five_bar_is_closed_by_what_moves_it(tmp_path, more, mimic, motors):
     axis, loops = '<axis xyz="0 -1 0"/>', loops_of(tmp_path, more)
     file = written(tmp_path, 'five_bar.urdf', (axis, axis + mimic))
     mechanism, = imported(file, *loops)
-    assert {settings.source for settings in mechanism.inputs.values()} == {
-        *re.search(r'name_mot: \[(.*)\]', more)[1].split(', ')}
+    # Inputs that follow one motor are geared to each other, so that their reach is known.
+    assert sorted(settings.source for settings in mechanism.inputs.values()) == sorted(
+        re.search(r'name_mot: \[(.*)\]', more)[1].split(', '))
     robot = Pinocchio((ROBOTS / 'five_bar.urdf').read_text())
     for angle in np.linspace(-0.3, 0.3, 7):
         check_closed(robot, published(mechanism, **motors(angle)), FEET)
