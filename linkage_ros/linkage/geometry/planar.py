@@ -341,7 +341,7 @@ def extended(arm: Arm, first: Real, second: Real, side: float, longest: Real) ->
     bar turns by c / (v |w|^2), and the barrel by (1 - (|w|^2 - r^2) / c^2) / 2 of that. Nothing
     cancels where the bar is as long as the arm, and c and v vanish together.
     """
-    limits = arm.stroke(first, second, longest + second)
+    limits = arm.stroke(abs(first), second, longest + second)
     length = arm.length
     power = arm.square - square(second) if length is None else \
         (length - second) * (length + second)
