@@ -39,6 +39,17 @@ def test_what_stands_on_an_arm_of_no_length_has_the_limit(word, size):
     hold(folded(word, size))
 
 
+@pytest.mark.parametrize('word', FOLDED)
+def test_a_ground_line_that_rounding_makes_longer_than_the_crank_is_as_long(word):
+    found, theta = folded(word, 0.3).linkage(), np.linspace(-13.0, 13.0, 999)
+    # 0.4 - 0.1 is 0.30000000000000004.
+    moved = mechanisms.create('custom', r=0.3, joints=[
+        'O ground 0.1 0', 'Q ground 0.4 0', *found.design.joints[2:]])
+    assert moved.period() == found.period()
+    for name, place in found.solve(theta).items():
+        np.testing.assert_allclose(moved.solve(theta)[name] - (0.1, 0.0), place, atol=1e-12)
+
+
 @pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('seeds', [(0, 299), *(range(k, k + 25) for k in range(0, 300, 25))])
 def test_random_linkages_of_equal_bars_have_limits_and_nothing_infinite(seeds):

@@ -64,6 +64,17 @@ def test_an_output_that_only_rounding_moves_has_no_answers():
     assert low <= high
 
 
+def test_a_slide_that_is_a_cylinder_of_the_inverse_may_be_negative():
+    linkage = custom('O ground 0 1.75', 'Q ground 1.77 -1.49', 'A crank O 0.65', 'B crank Q 0.6',
+                     'C slider A 2.1 Q along B in', 'D slider C 1.15 O -pi/2 in')
+    inverse, outputs = linkage.inverse(('CD', 'block2')), {}
+    assert ' cylinder ' in str(inverse)
+    for pose in [(0.5, 2.067), (0.5, -1.033)]:
+        outputs[pose] = [float(linkage.joint_angles(pose)[name]) for name in inverse.outputs]
+        assert min(math.dist(x.inputs, pose) for x in inverse.all(outputs[pose])) < 1e-12
+    assert len({math.copysign(1.0, place) for _, place in outputs.values()}) == 2
+
+
 def test_half_a_turn_is_the_one_below_zero():
     linkage = mechanisms.create('five_bar')
     height = float(linkage.solve((math.pi, 2.5))['P'][1])

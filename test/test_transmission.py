@@ -495,6 +495,16 @@ def test_joint_limits_can_be_commanded_and_measured(capsys, tmp_path):
                 0, expected(mechanism, inputs)[0])[1][0] < high
 
 
+def test_joint_limits_of_an_input_are_those_of_its_poses(capsys, tmp_path):
+    file = tmp_path / 'five.yaml'
+    file.write_text('/**: {ros__parameters: {mechanisms: [five], five: {type: custom, joints: ['
+                    'O ground 0 0, Q ground 1 0, A crank O 0.5, B crank Q 0.2, '
+                    'C dyad A B 0.6 0.3 left]}}}')
+    # A is no farther from Q than B and both bars, 1.1 m.
+    limits = limits_of(capsys, file, '--joints', 'five_crank', 'five_crank2')['five_crank']
+    np.testing.assert_allclose(limits, [-math.acos(0.04), math.acos(0.04)], atol=0.02)
+
+
 @pytest.mark.parametrize('name, more, limits', [
     ('QB', '', False), ('crank', '', False), ('crank2', '', False),
     ('crank2', 'crank.sweep: [-1.0, 20.0], ', (-40.0, 2.0)), ('crank', 'crank.sweep: [0.0, 9.0], ',

@@ -584,13 +584,12 @@ LKR_FORMULA int lever_solve(float crank_, int has_rates,
     const float k2 = -0.045f; /* -b */
     const float k19 = 0.04f; /* 2.0 * a */
     const float k23 = 0.025f; /* b - a */
-    const float k24 = 0.000625f; /* (b - a) * (b - a) */
+    const float k24 = 0.000625f;
     const float k27 = 0.0036f; /* (4.0 * b) * a */
     const float k48 = 0.081f; /* (a + b) if ((1.8 * b) < (a + b)) else (1.8 * b) */
     const float k70 = 0.000625f;
     const float k77 = 0.0f;
-    const float k82 = -0.025f; /* a - b */
-    const float k83 = 0.09f; /* 2.0 * b */
+    const float k82 = 0.09f; /* 2.0 * b */
     const float x0 = crank_;
     /* O ground 0 0 */
     p->O_x = 0.0f;
@@ -637,10 +636,10 @@ LKR_FORMULA int lever_solve(float crank_, int has_rates,
     by[0].A_y = v13;
     by[0].angle_crank = lkr_valid_where(1.0f, fabsf(x0), 0.0f);
     /* Rates of L slot Q A e out max(1.8*b,a+b) */
-    const float v88 = ((length_a * (k82 + (k83 * v28))) / v30) + 0.0f;
-    by[0].L_x = -((v88 * v50) * k48);
-    by[0].L_y = (v88 * v43) * k48;
-    by[0].angle_lever = v88;
+    const float v87 = ((length_a * ((k82 * v28) - k23)) / v30) + 0.0f;
+    by[0].L_x = -((v87 * v50) * k48);
+    by[0].L_y = (v87 * v43) * k48;
+    by[0].angle_lever = v87;
     by[0].slide_slide = (-((((v7 * 0.5f) * v9) * 2.0f) * k27)) / (2.0f * v78);
     return isfinite(valid);
 }

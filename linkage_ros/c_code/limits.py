@@ -64,7 +64,7 @@ def _values(mechanism: SceneMechanism, axis: Axis, arcs: Sequence[np.ndarray]) -
     parts = rng.uniform(-0.1, 1.1, (len(arcs), SAMPLES)).clip(0.0, 1.0)
     inputs = [np.append(first, arc.min() + part * np.ptp(arc))
               for first, part, arc in zip(start(mechanism), parts, arcs)]
-    values = linkage.joint_angles(inputs, [axis.output])[axis.output]
+    values = linkage.compiled('checked', (axis.output,)).over(*inputs)[0]
     first = values[np.isfinite(values).argmax()]
     return first + np.remainder(values - first + math.pi, math.tau) - math.pi if axis.turn \
         else values

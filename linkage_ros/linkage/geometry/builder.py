@@ -30,6 +30,7 @@ from ...formula.expression import (
     Real,
     real,
     sine,
+    valid_where,
 )
 
 GROUND = 'ground'
@@ -111,6 +112,8 @@ class Builder:
         self.ways: list[planar.Limit] = []
         self.inputs: list[Input] = []
         self.arguments: list[Real] = []
+        # Lengths of cylinders, NaN if negative; in an inverse linkage they may be signed slides.
+        self.positive: dict[Real, Real] = {}
         self.cylinders: list[tuple[str, str]] = []
         self.yokes: dict[str, str] = {}
         # The ground joints of the lines that what is added is mirrored in, one after the other.
@@ -171,7 +174,8 @@ class Builder:
         shortest, longest = self._stroke(base, pivot, bar)
         word = called or self._numbered('cylinder')
         length = self.drive(Input(word, LENGTH, shortest, longest), geared)
-        dyad = planar.extended(self._plain_arm(base, pivot), length, bar, side, longest)
+        positive = self.positive[length] = valid_where(length, length, TOLERANCE * longest)
+        dyad = planar.extended(self._plain_arm(base, pivot), positive, bar, side, longest)
         self.limits += dyad.limits
         link = self._add_link(pivot, name, dyad.second, bar)
         self._place(name, pivot, dyad.second, link, bar)

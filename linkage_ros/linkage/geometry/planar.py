@@ -91,6 +91,11 @@ def squares_apart(first: Real, second: Real) -> Real:
     return exact_sum(first, -second) * (first + second)
 
 
+def are_equal(first: Real, second: Real) -> Real:
+    """Return whether two lengths are equal up to the rounding of one between two places."""
+    return abs(first - second) <= 0.5 * TOLERANCE * second
+
+
 def on_line(along: Complex, place: Real) -> Complex:
     """Return the vector of a length along a direction; both parts are NaN where the length is."""
     # Generated code omits products with zero, which would carry the NaN.
@@ -188,7 +193,8 @@ class Arm:
         The bars first and second [m] go from that corner to the arm's end and to its foot. Vector
         and arm are the parallel sides of a trapezoid; their product is |first^2 - second^2|.
         """
-        power = valid_where(squares_apart(first, second), self.square)
+        power = valid_where(where(are_equal(first, second), 0.0, squares_apart(first, second)),
+                            self.square)
         return self.vector * (power / self.divisor)
 
     def _limit(self, radius: Real, size: Real, margin: Real) -> Limit:
@@ -213,17 +219,19 @@ class CrankArm(Arm):
         along = line.direction()
         turn = crank.zero * along.conjugate()
         s, h = _half_angle(crank.angle, turn)
-        is_isosceles = abs(g - m) <= 0.0
+        is_isosceles = are_equal(g, m)
+        apart = where(is_isosceles, 0.0, g - m)
         h = h + where(is_isosceles, TINY, 0.0) if smooth else h
-        vector = along * Complex((g - m) + 2.0 * m * square(h), 2.0 * m * s * h)
+        vector = along * Complex(apart + 2.0 * m * square(h), 2.0 * m * s * h)
         self.foot = crank.centre + crank.bar() if reverse else ground
-        self.square = square(g - m) + 4.0 * g * m * square(h)
+        self.square = square(apart) + 4.0 * g * m * square(h)
         self._clear = square(h) + where(is_isosceles, 0.0, 1.0)
         self._crank, self._turn, self._is_reversed = crank, turn, reverse
         self._g, self._m, self._s, self._h, self._is_smooth = g, m, s, h, smooth
+        self._apart, self._is_isosceles = apart, is_isosceles
         # The arm between two equal lengths bisects them, also where it has no length itself.
         spin_ratio = where(is_isosceles, 0.5,
-                           m * ((m - g) + 2.0 * g * square(h)) / self.square)
+                           m * (2.0 * g * square(h) - apart) / self.square)
         vector.spin = Rate((crank.angle,), lambda rate: rate * spin_ratio)
         self.vector = -vector if reverse else vector
 
@@ -237,7 +245,7 @@ class CrankArm(Arm):
 
     def difference(self, first: Real, second: Real, shorter: Limit) -> Real:
         """Return `first - second`, or its like in the arm where the limit takes both as equal."""
-        difference, shortest = exact_sum(first, -second), abs(self._g - self._m)
+        difference, shortest = exact_sum(first, -second), abs(self._apart)
         return where(abs(shorter.ends.end) <= shorter.tolerance,
                      where(difference < 0.0, -shortest, shortest), difference
                      ) if shorter.smooth and shorter.ends else difference
@@ -255,7 +263,8 @@ class CrankArm(Arm):
         g, m, s, h = self._g, self._m, self._s, self._h
         gm = 4.0 * g * m
         start = sign * (exact_sum(radius, -g, -m) * exact_sum(radius, g, m))
-        end = sign * (exact_sum(radius, -g, m) * exact_sum(radius, g, -m))
+        end = sign * where(self._is_isosceles, square(radius),
+                           exact_sum(radius, -g, m) * exact_sum(radius, g, -m))
         # The margin can vanish only next to its smaller value at an end.
         margin = where(abs(start) <= abs(end), start + sign * gm * square(s),
                        end - sign * gm * square(h))
@@ -332,7 +341,7 @@ def extended(arm: Arm, first: Real, second: Real, side: float, longest: Real) ->
     bar turns by c / (v |w|^2), and the barrel by (1 - (|w|^2 - r^2) / c^2) / 2 of that. Nothing
     cancels where the bar is as long as the arm, and c and v vanish together.
     """
-    limits = arm.stroke(first, second, longest + second)
+    limits = arm.stroke(abs(first), second, longest + second)
     length = arm.length
     power = arm.square - square(second) if length is None else \
         (length - second) * (length + second)

@@ -108,8 +108,9 @@ def _of_sketch(outputs: Names, sketch: _Sketch) -> InverseLinkage:
     modes = {}
     for signs in product((1.0, -1.0), repeat=len(branches)):
         built = LinkageFormulas(design, dict(zip(branches, signs))).built
-        modes[signs] = tuple(substituted([read.value(built) for read in sketch.reads],
-                                         dict(zip(built.arguments, values))))
+        replaced = dict(zip([*built.arguments, *map(built.positive.get, built.arguments)],
+                            [*values, *values]))
+        modes[signs] = tuple(substituted([read.value(built) for read in sketch.reads], replaced))
     return InverseLinkage(design.joints, drives, tuple(branches), modes, turns)
 
 
