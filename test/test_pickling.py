@@ -55,6 +55,13 @@ def test_a_copy_answers_the_same(name, way):
     assert answers(other) == answers(linkage)
 
 
+@pytest.mark.parametrize('way', WAYS.values(), ids=WAYS)
+def test_answers_go_to_other_processes(way):
+    solutions = mechanisms.create('five_bar').inputs_for(('P.x', 'P.y'), (0.05, 0.15))
+    assert [(each.inputs, each.mode) for each in map(way, solutions)] == [
+        (each.inputs, each.mode) for each in solutions]
+
+
 @pytest.mark.parametrize('name', LINKAGES)
 def test_a_copy_has_the_code_of_what_it_was_copied_from(name):
     linkage = LINKAGES[name]

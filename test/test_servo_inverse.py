@@ -119,8 +119,7 @@ INPUTS_REFUSED = [
     *(({'near': [0.0, bad]}, 'near must be finite and within 1e+06 of zero')
       for bad in (1e9, -1e9, math.nan)),
     ({'outputs': ['P.x']}, 'leg has 2 inputs: as many outputs are needed, not 1'),
-    ({'outputs': ['P.x', 'P.x']},
-     'outputs must differ, got P.x, P.x'),
+    ({'outputs': ['P.x', 'P.x']}, 'outputs must differ, got P.x, P.x'),
     ({'mechanism': 'drop'}, 'drop has 1 input: as many outputs are needed, not 2')]
 
 

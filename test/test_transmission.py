@@ -124,7 +124,8 @@ def test_what_is_not_assembled_is_out_of_reach_whatever_is_commanded(tmp_path):
     assert own[0] < low - 0.1 and own[-1] > high + 0.1
 
 
-READING = mechanisms.create('custom', joints=LIFT).joint_angles(0.5)['QB'] - 0.1
+READING, TOP = mechanisms.create('custom', joints=LIFT).joint_angles(
+    [0.5, -2.5])['QB'] - (0.1, 0.0)
 CHOICES = [
     # A geared joint counts turns both ways, and so does an encoder on it.
     (GEARED, {}, [], 1, [(value, -0.5 * value) for value in (1.0, -6.4, -7.0, -20.0)]),
@@ -136,8 +137,10 @@ CHOICES = [
     ([*GEARED[:3], 'D crank Q 0.27 geared crank -2 -1.4', GEARED[4]], {}, [], 1,
      [(-2.0 * crank - 1.4, crank) for crank in (0.4, -6.4)]),
     # What does not count turns is within one with its offset.
-    *((LIFT, {'joint_names': [f'QB={sign}3.0']}, ['wheel'], 0,
-       [(0.5, side * math.remainder(READING + 3.1, math.tau))])
+    (LIFT, {'joint_names': ['QB=wheel+3.0']}, ['wheel'], 0,
+     [(0.5, math.remainder(READING + 3.1, math.tau))]),
+    # If it passes half a turn, it goes on there.
+    *((LIFT, {'joint_names': [f'QB={sign}0.8']}, ['wheel'], 0, [(-2.5, side * (TOP + 0.8))])
       for sign, side in (('wheel+', 1.0), ('-wheel-', -1.0))),
     # A sensor repeats after a turn of what it measures; a geared one counts turns.
     *((LIFT, {'crank.measures': 'QB', 'crank.ratio': ratio, 'crank.offset': 0.1,
