@@ -280,7 +280,7 @@ def custom(made):
 
 
 # What is asked with names, which a function makes of texts.
-ASKED = {
+CALLS = {
     'dimensions': lambda made: mechanisms.create(made('jansen'), **{made('m'): 14.0}).dimensions,
     'changed dimensions': lambda made: mechanisms.create('jansen').with_dimensions(
         **{made('m'): 14.0}).dimensions,
@@ -304,9 +304,9 @@ ASKED = {
 
 
 @pytest.mark.parametrize('made', [np.str_, member])
-@pytest.mark.parametrize('what', ASKED)
+@pytest.mark.parametrize('what', CALLS)
 def test_what_is_asked_by_names_of_any_class_is_the_same(made, what):
-    first, later = ASKED[what](made), ASKED[what](str)
+    first, later = CALLS[what](made), CALLS[what](str)
     assert first == later and len(first) > 0
     # Nor are later callers given names of that class.
     assert all(type(each) is str for each in (*first, *later) if isinstance(each, str))

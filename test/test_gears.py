@@ -64,8 +64,8 @@ def test_a_pose_is_answered_in_the_turn_in_which_it_is(ratio):
             assert many == pytest.approx([theta] * 2, abs=close)
             (first, *_) = linkage.inverse(output).all(value, theta)
             assert first.inputs[0] == pytest.approx(theta, abs=close)
-            away = linkage.joint_angles(first.inputs[0], (output,))[output] - value
-            assert math.remainder(away, math.tau) == pytest.approx(
+            error = linkage.joint_angles(first.inputs[0], (output,))[output] - value
+            assert math.remainder(error, math.tau) == pytest.approx(
                 0.0, abs=1e-12 + 8.0 * size * math.ulp(theta))
 
 
@@ -108,10 +108,10 @@ def test_the_reach_is_where_it_can_be_assembled(ratio, lines):
         'O ground 0 0', 'Q ground 2 0', 'A crank O 1', *lines.format(ratio).split('; ')])
     first, = linkage.inputs
     theta = np.random.default_rng(0).uniform(first.low, first.high, 4001)
-    whole = np.isfinite(linkage.solve(theta)['B']).all(axis=1)
-    assert whole.any() and not whole.all()
+    assembled = np.isfinite(linkage.solve(theta)['B']).all(axis=1)
+    assert assembled.any() and not assembled.all()
     reach = linkage.reach()
-    wrong = theta[[first.on(reach, x) for x in theta.tolist()] != whole]
+    wrong = theta[[first.on(reach, x) for x in theta.tolist()] != assembled]
     ends = np.ravel(reach)
     assert all(np.min(np.abs(ends - value)) < 1e-6 for value in wrong)
     assert len(wrong) < 5

@@ -208,5 +208,5 @@ def test_next_to_an_extreme_and_at_an_end_a_pose_is_found_with_another_input_hel
     for theta in [at] if at else np.ravel(linkage.reach(held)).tolist():
         value = float(linkage.joint_angles((theta, held), [output])[output])
         solutions = linkage.inverse((output, 'drive')).all((value, held))
-        away = min((abs(each.inputs[0] - theta) for each in solutions), default=1.0)
-        assert away < (1e-10 if at else 1e-12)
+        distance = min((abs(each.inputs[0] - theta) for each in solutions), default=1.0)
+        assert distance < (1e-10 if at else 1e-12)

@@ -38,13 +38,13 @@ def shown():
 
 def displays(config):
     """Return all displays, those in groups too, but not the groups."""
-    found, left = [], list(config['Visualization Manager']['Displays'])
+    displays_, left = [], list(config['Visualization Manager']['Displays'])
     while left:
         display = left.pop(0)
         left += display.get('Displays', ())
         if display['Class'] != rviz.GROUP:
-            found.append(display)
-    return found
+            displays_.append(display)
+    return displays_
 
 
 def topics(config):

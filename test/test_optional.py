@@ -151,9 +151,9 @@ def test_a_node_moves_without_machine_code_and_says_why_once(harness, tmp_path, 
         process.interrupt(signal.SIGINT)
         code, printed = process.end()
     assert code == 0 and 'Traceback' not in printed
-    said = [line for line in printed.splitlines() if 'llvmlite' in line]
+    line, = [line for line in printed.splitlines() if 'llvmlite' in line]
     level = 'INFO' if way == 'missing' else 'WARN'
-    assert len(said) == 1 and f'[{level}]' in said[0] and optional.INSTALL['llvmlite'] in said[0]
+    assert f'[{level}]' in line and optional.INSTALL['llvmlite'] in line
 
 
 @pytest.mark.nightly(all_but=1)
@@ -166,9 +166,9 @@ def test_a_node_that_cannot_do_without_ends_in_one_sentence(
     write(tmp_path, package, way)
     process = harness.Process(name, SCENE, first=tmp_path)
     code, printed = process.end()
-    said = [line for line in printed.splitlines() if '[FATAL]' in line]
+    lines = [line for line in printed.splitlines() if '[FATAL]' in line]
     assert code == 1 and 'Traceback' not in printed, printed
-    assert len(said) == 1 and said[0].endswith(optional.INSTALL[package])
+    assert len(lines) == 1 and lines[0].endswith(optional.INSTALL[package])
 
 
 @pytest.mark.nightly

@@ -73,9 +73,9 @@ def test_the_same_request_gives_the_same_bytes(tmp_path, ending, args):
 
 @pytest.mark.skipif(not shutil.which('ffmpeg'), reason='ffmpeg is not installed')
 def test_an_mp4_has_the_frames_asked_for_and_the_same_bytes_each_time(tmp_path):
-    asked = '--frames', '3', '--fps', '5', '--size', '320x240'
-    once = rendered(tmp_path, *asked, ending='mp4').read_bytes()
-    file = rendered(tmp_path, *asked, ending='mp4')
+    options = '--frames', '3', '--fps', '5', '--size', '320x240'
+    once = rendered(tmp_path, *options, ending='mp4').read_bytes()
+    file = rendered(tmp_path, *options, ending='mp4')
     assert file.read_bytes() == once and once[4:8] == b'ftyp'
     raw = subprocess.run(['ffmpeg', '-v', 'info', '-i', file, '-f', 'rawvideo', '-'],
                          capture_output=True, check=True)

@@ -297,13 +297,13 @@ def test_accelerations_are_those_of_the_motion(g1):
     step, at, speed, change = 1e-4, (0.1, -0.05), (1.0, 2.0), (3.0, -1.0)
     inputs = [[x + v * t + 0.5 * a * t * t for x, v, a in zip(at, speed, change)]
               for t in (-step, 0.0, step)]
-    for values, found in (
+    for values, results in (
             ([pose(g1, each) for each in inputs],
              list(g1.joint_accelerations(at, speed, change, ['pitch', 'roll']).values())),
             ([g1.solve(each, ('R_roll',))['R_roll'] for each in inputs],
              g1.acceleration(at, speed, change, ('R_roll',))['R_roll'])):
         np.testing.assert_allclose(
-            found, (values[0] - 2.0 * values[1] + values[2]) / step ** 2, rtol=1e-5, atol=1e-6)
+            results, (values[0] - 2.0 * values[1] + values[2]) / step ** 2, rtol=1e-5, atol=1e-6)
 
 
 def test_the_reach_of_one_rod_ends_where_it_is_stretched():

@@ -8,6 +8,7 @@ import math
 import re
 from xml.etree import ElementTree
 
+from effort import few_calls
 from linkage_ros import mechanisms, scene
 from linkage_ros.robot_model import urdf
 from linkage_ros.scene import slider, writing
@@ -37,18 +38,18 @@ def test_without_parameters_the_scene_is_the_catalogue():
 
 def rewritten(before, folder):
     """Return the values with which a scene is written, and the scene that is read of them."""
-    kept, file = writing.without_defaults(before), folder / 'again.yaml'
-    file.write_text(writing.in_yaml(kept))
-    return kept, scene.load(str(file))
+    values, file = writing.without_defaults(before), folder / 'again.yaml'
+    file.write_text(writing.in_yaml(values))
+    return values, scene.load(str(file))
 
 
 @pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('file', EXAMPLES)
 def test_a_scene_is_written_as_the_few_values_that_tell_it(file, tmp_path):
     before = scene.load(str(file))
-    kept, again = rewritten(before, tmp_path)
+    values, again = rewritten(before, tmp_path)
     assert again.parameters == before.parameters
-    usual = [p.name for p in before.parameters if p.name in kept and p.value == p.default]
+    usual = [p.name for p in before.parameters if p.name in values and p.value == p.default]
     assert all('.dimensions.' in name or name.rpartition('.')[2] in ('mechanisms', 'type', 'scale')
                for name in usual)
 
@@ -180,13 +181,15 @@ def test_any_name_of_a_joint_can_be_quoted(name):
     assert joints['BC'] == (name, -1.0, 1.0, True, True)
 
 
-def test_only_mechanisms_that_are_given_something_else_are_read_again():
-    parameters = {'jansen.dimensions.m': 15.0, 'peaucellier.scale': 0.1}
-    before = scene.read(parameters)
-    after = scene.changed(
-        before, {'jansen.dimensions.m': 14.9, 'peaucellier.scale': 0.1}).mechanisms
-    assert {name for name in after if after[name] is not before.mechanisms[name]} == {'jansen'}
-    assert [p.name for p in scene.changed(before, {'rate': 9.0}).changed_from(before)] == ['rate']
+def test_of_a_thousand_mechanisms_only_one_that_changes_is_read_again():
+    names = [f'leg{i}' for i in range(1000)]
+    before = scene.read({'mechanisms': names, **{f'{name}.type': 'jansen' for name in names}})
+    values = {'leg7.dimensions.m': 14.9, 'leg8.scale': 1.0, 'rate': 9.0}
+    with few_calls(100_000):
+        after = scene.changed(before, values)
+    assert {name for name in names
+            if after.mechanisms[name] is not before.mechanisms[name]} == {'leg7'}
+    assert [p.name for p in after.changed_from(before)] == ['rate', 'leg7.dimensions.m']
 
 
 def test_a_crank_swings_in_the_arc_that_its_start_is_in():
@@ -274,8 +277,8 @@ def test_every_parameter_says_what_it_is_of_with_its_unit():
         field, (name, _, key) = each.field, each.name[4:].partition('.')
         assert field.meaning.endswith('.') and '{' not in field.meaning + field.unit
         if field.kind == 'double':
-            said = ''.join(re.findall(r'\[(.*?)\]', field.meaning))
-            assert field.unit == said.replace('1', ''), each.name
+            units = ''.join(re.findall(r'\[(.*?)\]', field.meaning))
+            assert field.unit == units.replace('1', ''), each.name
         if name in ('cylinder', 'tilt'):
             unit = {'cylinder': 'm', 'tilt': 'rad'}[name] + '/s' * (key == 'speed')
             assert name in field.meaning and field.unit in (unit, '')

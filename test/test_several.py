@@ -23,11 +23,11 @@ def agree(linkage, outputs, values, expected, sure=1e-3):
     solutions, expected, worst = linkage.inputs_for(outputs, values), list(expected), 0.0
     assert len(solutions) == len(expected), (linkage, values, solutions, expected)
     for inputs, bends in expected:
-        gap, answer = min((max(input_.distance(x, y) / input_.size for input_, x, y in zip(
+        distance, answer = min((max(input_.distance(x, y) / input_.size for input_, x, y in zip(
             linkage.inputs, answer.inputs, inputs)), answer) for answer in solutions)
-        assert gap * answer.margin < 1e-12, (linkage, values, inputs, answer)
+        assert distance * answer.margin < 1e-12, (linkage, values, inputs, answer)
         assert answer.margin < sure or bends.items() <= answer.signs.items()
-        worst = max(worst, gap)
+        worst = max(worst, distance)
     return worst
 
 
@@ -74,11 +74,11 @@ def test_a_mode_is_followed_where_that_beyond_the_fold_is_nearer():
                                 c=0.7534721238980263, d=1.4852815970909945, f=1.514771842943107)
     inverse, near = linkage.inverse(('P.x', 'P.y')), (-0.7667284128232743, -0.7015517149803334)
     values = 2.040979962430155, -0.5094493998914134
-    nearer, kept = inverse.all(values, near)[:2]
-    assert (nearer.mode, kept.mode) == ('AP+ CP- det-', 'AP+ CP+ det+')
+    nearer, expected = inverse.all(values, near)[:2]
+    assert (nearer.mode, expected.mode) == ('AP+ CP- det-', 'AP+ CP+ det+')
     with few_calls(3000):
         inputs, _ = inverse.follow(values, near)
-    assert inputs == pytest.approx(kept.inputs, abs=1e-9)
+    assert inputs == pytest.approx(expected.inputs, abs=1e-9)
 
 
 def test_next_to_a_fold_both_searched_solutions_are_found_and_at_it_one():
