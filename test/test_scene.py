@@ -170,6 +170,9 @@ def test_joints_bear_a_robots_own_names_signs_and_zeros():
                      'left0_BC': ('left-knee', -1.0, 0.0, True, False),
                      'right1_EF': ('ankle.2', -1.0, -0.15, True, True)}
     assert joints['left1_BC'].name == 'jansen_left1_BC' and len(joints) == 1 + 4 * 6
+    # A length is not wrapped.
+    piston = alone('slider_crank', joint_names=['block=-piston+9']).joints['block']
+    assert piston.of(3.5) == 5.5
 
 
 @pytest.mark.parametrize('name', [
@@ -251,6 +254,9 @@ def test_every_slider_has_its_value_between_finite_ends(parameters):
     *((name, {'crank.ratio': ratio}, approx(ends, abs=close)) for ratio in (-2.0, 1.0)
       for name, ends, close in (('crank.ratio', sorted((0.1 * ratio, 10.1 * ratio)), 0.2),
                                 ('crank.offset', (-math.pi, math.pi), 0.1))),
+    # A stroke of 8 m is about two turns.
+    ('cylinder.offset', {'joints': [*SIGNED['own.joints'], 'E cylinder Q O 8 left']},
+     approx((-4.0 * math.pi, 4.0 * math.pi))),
     # Grashof: with bars 1, r, 3 and a base of 4 the crank turns where r is from 2 to 6.
     ('dimensions.r', {'dimensions.r': 3.0}, approx((2.1, 5.9), abs=0.1)),
     # In this sweep a tenth of it will do.

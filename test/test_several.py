@@ -175,6 +175,11 @@ def test_answers_lie_in_the_sweeps_or_the_reason_says_so():
     assert request.reason(0.05, 0.15) == (
         'P.x, P.y at 0.05, 0.15 needs the crank at 1.74732 rad, crank2 at 1.58104 rad, outside '
         'crank.sweep [3, 3.5]')
+    # The nearest comes first: a length counts in parts of its stroke, 91 m.
+    boom = alone(['O ground 0 0', 'Q ground 40 0', 'A crank O 1', 'B cylinder Q A 50 left'])
+    values = boom.linkage.function((), ('B.x', 'A.x'))(0.9, 48.0)
+    cranks = [x[0] for x, _ in InverseRequest(boom, ('B.x', 'A.x')).answers(values, (-0.3, 48.0))]
+    assert cranks == pytest.approx([-0.9, 0.9])
 
 
 def test_an_output_that_stands_still_in_most_poses_is_answered_where_it_moves():
