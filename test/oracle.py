@@ -878,5 +878,4 @@ SCENES = {
         'ankle.loads': ['pitch=12.0', 'roll=-3.0']},
     'tiny and huge': {
         'mechanisms': ['m', 'n'], 'm.type': 'jansen', 'm.scale': 1e-30, 'n.type': 'peaucellier',
-        'n.scale': 1e27},
-}
+        'n.scale': 1e27}}

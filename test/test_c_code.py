@@ -314,8 +314,7 @@ def named(number):
     return text
 
 
-@pytest.mark.parametrize('number', [
-    'double', pytest.param('float', marks=pytest.mark.nightly)])
+@pytest.mark.parametrize('number', ['double', pytest.param('float', marks=pytest.mark.nightly)])
 @pytest.mark.parametrize('compiler, language', [pytest.param(
     compiler, language, marks=pytest.mark.skipif(
         not shutil.which(compiler), reason=f'{compiler} is not installed'))

@@ -104,8 +104,7 @@ def test_gears_have_their_ratios_and_a_partial_message_moves_its_motor_alone(sta
 
 @pytest.mark.parametrize('name, motor, base', [
     ('abduction', 'abduction_motor', 'torso'), ('knee', 'knee_motor', 'thigh')])
-def test_markers_stay_on_the_link_that_the_loop_stands_on_wherever_it_is(
-        graph, name, motor, base):
+def test_markers_stay_on_the_link_that_the_loop_stands_on_wherever_it_is(graph, name, motor, base):
     robot, urdf = Robot(graph), FIRST(URDF)
     drawn = graph.listen(MarkerArray, f'{name}/markers')
     for at in (-4.0, 4.0):

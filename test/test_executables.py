@@ -93,8 +93,7 @@ ARGUMENTS = [
     (['--ros-args', '--bar'], 'bad arguments: .*--bar'),
     (['--ros-args', '-p', 'rate'], "bad arguments: .*Couldn't parse parameter override"),
     (['--ros-args', '-r', '__ns:=two words'], 'bad arguments: .*remap'),
-    (['--ros-args', '--params-file', 'nowhere.yaml'], 'bad arguments: .*nowhere.yaml'),
-]
+    (['--ros-args', '--params-file', 'nowhere.yaml'], 'bad arguments: .*nowhere.yaml')]
 
 
 @pytest.mark.parametrize('name, arguments, reason', [

@@ -64,8 +64,7 @@ SPECIAL = {
     'a gear without a place where the input is zero': (
         ['A ground 0 0', 'B ground 0.4 0', 'C cylinder A B 0.3 left',
          'D carriage B along A -0.7 -0.2 geared cylinder -1.5 0.2 called drive',
-         'E dyad D A 0.6 0.5 left'], {}, ['AE'], np.linspace(0.28, 0.58, 7)),
-}
+         'E dyad D A 0.6 0.5 left'], {}, ['AE'], np.linspace(0.28, 0.58, 7))}
 
 
 @pytest.mark.parametrize('special', SPECIAL)

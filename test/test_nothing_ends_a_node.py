@@ -227,8 +227,7 @@ def ends_quietly(process, number):
 @pytest.mark.parametrize('name, publishers', [
     ('crank_driver', 0), ('servo_inverse', 0), ('kinematics', 0), ('kinematics', 100),
     ('scene', 0), ('scene', 100)])
-def test_a_signal_ends_the_start_of_a_thousand_mechanisms(
-        tmp_path, name, publishers, number):
+def test_a_signal_ends_the_start_of_a_thousand_mechanisms(tmp_path, name, publishers, number):
     path = tmp_path / 'many.yaml'
     names = [f'm{i}' for i in range(1000)]
     path.write_text(f'/**:\n  ros__parameters:\n    mechanisms: [{", ".join(names)}]\n' + ''.join(

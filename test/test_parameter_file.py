@@ -77,8 +77,7 @@ def of_ros(path, name, expected):
         # An empty list has no type, and is declared only by name.
         node = Node(name, **arguments)
         dynamic = ParameterDescriptor(dynamic_typing=True)
-        parameters = {key: node.declare_parameter(key, None, dynamic)
-                      for key in expected}
+        parameters = {key: node.declare_parameter(key, None, dynamic) for key in expected}
     node.destroy_node()
     return {key: list(parameter.value) if hasattr(parameter.value, 'tolist') else parameter.value
             for key, parameter in parameters.items() if key not in OF_ROS}

@@ -35,8 +35,7 @@ HOSTILE = [
         math.nan, math.inf, -math.inf, '', ' ', 'no', '\0', 'a\nb', '/world', _long,
         [b'\0', b'\xff'], [True, False], [1, 2, 3], [1.0, math.nan], [2.0, 1.0], [math.inf] * 6,
         [1e308] * 6, [0.0] * 10 ** 5, ['no'], ['', ''], [_long], ['a'] * 10 ** 5)],
-    *[Parameter('', type_, []) for type_ in Parameter.Type if 'ARRAY' in type_.name],
-]
+    *[Parameter('', type_, []) for type_ in Parameter.Type if 'ARRAY' in type_.name]]
 
 
 class Client:

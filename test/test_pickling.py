@@ -38,8 +38,7 @@ def answers(linkage):
     theta = several if len(several) > 1 else FIVE
     values = [*linkage.solve(theta).values(), *linkage.joint_angles(theta).values(),
               *linkage.joint_rates(theta).values(), *linkage.velocity(theta).values()]
-    if len(linkage.inputs) == 1 and not any(
-            map(np.ndim, linkage.dimensions.values())):
+    if len(linkage.inputs) == 1 and not any(map(np.ndim, linkage.dimensions.values())):
         values += [linkage.reach(), linkage.dead_points(), linkage.function()(0.4)]
     return b''.join(map(bits, values))
 

@@ -57,8 +57,7 @@ OTHERS = {
         'O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'C crank Q 1 geared crank -0.5 0.3',
         'B dyad A C 2 2 left', 'D crank B 0.4 zero A geared crank 2 0.1', 'R ground 1 5',
         'E cylinder R B 2 left', 'S ground 8 3', 'T ground 9 5',
-        'F carriage S along T 0 4 geared cylinder 0.5 0.2'),
-}
+        'F carriage S along T 0 4 geared cylinder 0.5 0.2')}
 LISTED = {
     **{kind: random_linkages.Design(mechanisms.design(kind).joints, mechanisms.defaults(kind), {})
        for kind in mechanisms.TYPES},
@@ -186,8 +185,7 @@ MENDED = {
         'F slider E 3.166 A along C out'), (-2.2665130987562727,)),
     'an image of a joint of the ground': ((
         'A ground 0 0', 'C ground 0.170347395 0', 'D ground 0.03191923 1.50131151692',
-        'E crank A 1', 'K image A D C'), (0.3,)),
-}
+        'E crank A 1', 'K image A D C'), (0.3,))}
 
 
 @pytest.mark.nightly(all_but=4)

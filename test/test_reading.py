@@ -172,8 +172,7 @@ SEEDS = {
     'short': message(['a']), 'two': message(['a_crank', 'b'], frame='world'),
     'efforts': message(['leg_crank'] * 3, effort=True), 'none': message([]),
     'no velocities': message(['ab', 'abc', 'abcd'], velocities=False),
-    'nameless': JointState(position=[1.0, 2.0]), 'names': JointState(name=['a', 'b', 'c']),
-}
+    'nameless': JointState(position=[1.0, 2.0]), 'names': JointState(name=['a', 'b', 'c'])}
 
 
 @pytest.mark.nightly(all_but=3)

@@ -439,8 +439,7 @@ def test_an_svg_has_every_part_in_its_order_where_it_was_solved(tmp_path, size, 
     (['jansen.yaml', '--out', 'a.png', '--show', 'lables'], 'did you mean labels?'),
     (['picture.png', '--out', 'a.png'], 'picture.png'),
     (['--mechanism', 'jansen', 'all.yaml', '--out', 'a.png'], ': SCENE, before any --mechanism'),
-    (['still.yaml', '--out', 'a.gif'], 'speed is 0, and its turns are what an animation shows'),
-])
+    (['still.yaml', '--out', 'a.gif'], 'speed is 0, and its turns are what an animation shows')])
 def test_what_cannot_be_is_said_in_one_line_and_no_file_is_left(
         args, said, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

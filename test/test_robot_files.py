@@ -592,8 +592,7 @@ def test_a_parallelogram_stays_one_on_universal_joints_and_in_any_pose(tmp_path,
     (9e-4, 'from_robot: Warning: the file is not exact: axes lean by 0.0009 rad, and loops stay'),
     (5e-6, 'from_robot: Warning: the file is not exact: axes lean by 5e-06 rad, and loops stay'),
     (0.0, ''), (2e-3, 'are 0.115 degrees from it, more than 0.057; ')])
-def test_a_misfit_is_printed_and_imported_if_it_is_small(
-        tmp_path, lean, why, file, axis, start):
+def test_a_misfit_is_printed_and_imported_if_it_is_small(tmp_path, lean, why, file, axis, start):
     code, out, err = printed(written(tmp_path, file, (axis, axis.replace('"0 ', f'"{lean} '))))
     assert code == (lean > 1e-3) and why in err and bool(why) == ('rad, and' in err or code > 0)
     # Where the file has it, by as much as the axis leans.

@@ -345,8 +345,7 @@ def test_the_reach_of_one_rod_ends_where_it_is_stretched():
     ((*G1[:5], 'L bar left 0 0 0 roll 1 0 0'), 'expected NAME and one of the constructions hinge'),
     (('a hinge ground at 0 0 0 axis 0 0 1', 'm motor ground at 2 0 0 axis 0 0 1',
       'R rod m 3 0 0 a 1 0 0'), 'as drawn it is at a dead point of a'),
-    (('a hinge ground at 0 0 0 axis 0 0 1', 'R rod ground 3 0 0 a 1 1 0'), 'line that drives it'),
-])
+    (('a hinge ground at 0 0 0 axis 0 0 1', 'R rod ground 3 0 0 a 1 1 0'), 'line that drives it')])
 def test_what_cannot_be_solved_is_refused_in_words(lines, problem):
     with pytest.raises(ValueError, match=problem):
         made(lines)

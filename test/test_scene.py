@@ -154,8 +154,7 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     *[({**OWN, 'own.joints': [*joints, 'A crank O 1'], 'own.mirrored': True},
        'own.leg_pairs must be 1 and mirrored false: only')
       for joints in (['O ground 0 0', 'B crank O 1'], ['O ground 1 0'])],
-    ({'jansen.joints': ['O ground 0 0']}, 'jansen.joints is not a parameter'),
-])
+    ({'jansen.joints': ['O ground 0 0']}, 'jansen.joints is not a parameter')])
 def test_a_wrong_parameter_is_named_with_what_is_allowed(parameters, named):
     with pytest.raises(scene.SceneError, match='^' + named) as refused:
         scene.read(parameters)
@@ -337,8 +336,7 @@ def test_scenes_of_the_same_values_are_equal_however_they_are_written():
     ({'mechanisms': ['klann'], 'klann.crank.measures': 'crank.x'}, 'klann.crank.measures: '),
     ({'mechanisms': ['klann'], 'klann.crank.measures': 'distance(O,B)'}, 'does not move'),
     *[({'jansen.loads': ['BC=1'], **more}, 'jansen.loads must be empty for more than one leg')
-      for more in ({'jansen.leg_pairs': 2}, {'jansen.mirrored': True})],
-])
+      for more in ({'jansen.leg_pairs': 2}, {'jansen.mirrored': True})]])
 def test_settings_of_inputs_and_loads_that_cannot_be_are_refused(parameters, reason):
     base = ACTUATED if any(key.startswith('own') for key in parameters) else {}
     with pytest.raises(scene.SceneError) as refused:
