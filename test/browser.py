@@ -25,7 +25,7 @@ FLAGS = ('--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-
 DEADLINE = 30.0
 
 
-def found():
+def executable():
     """Return the path of a browser, or None."""
     return next(filter(None, map(shutil.which, NAMES)), None)
 
@@ -85,7 +85,7 @@ class Browser:
 
     def __enter__(self):
         self._process = subprocess.Popen(
-            [found(), *FLAGS, f'--user-data-dir={self._profile}', 'about:blank'],
+            [executable(), *FLAGS, f'--user-data-dir={self._profile}', 'about:blank'],
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
             written = self._profile / 'DevToolsActivePort'
@@ -156,10 +156,10 @@ class Browser:
 
     def value(self, expression: str):
         """Return the value of an expression in the page; wait for it if it is a promise."""
-        said = self._do('Runtime.evaluate', expression=expression, awaitPromise=True,
+        reply = self._do('Runtime.evaluate', expression=expression, awaitPromise=True,
                               returnByValue=True)
-        assert 'exceptionDetails' not in said, said['exceptionDetails']
-        return said['result'].get('value')
+        assert 'exceptionDetails' not in reply, reply['exceptionDetails']
+        return reply['result'].get('value')
 
     def middle(self, expression: str):
         """Return the middle x, y and the width of an element, as the page's pixels."""

@@ -45,8 +45,8 @@ class Memory:
 
     def send(self, side, position, velocity=0.0, effort=0.0):
         """Return the status and the other side's positions, velocities, efforts: or UNWRITTEN."""
-        given, found = (np.full(self._shape, each, self._kind) for each in (0.0, UNWRITTEN))
-        for row, values in zip(given, (position, velocity, effort)):
+        arguments, found = (np.full(self._shape, each, self._kind) for each in (0.0, UNWRITTEN))
+        for row, values in zip(arguments, (position, velocity, effort)):
             row[:self._n] = values
-        status = self._send(side, *(ctypes.c_void_p(x.ctypes.data) for x in (given, found)))
+        status = self._send(side, *(ctypes.c_void_p(x.ctypes.data) for x in (arguments, found)))
         return status, found[:, :self._n]

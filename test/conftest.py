@@ -81,7 +81,7 @@ def pytest_collection_finish():
 
 
 @pytest.fixture(scope='session')
-def kept():
+def tracked():
     """Return the files that git keeps, or would keep."""
     root = Path(__file__).parents[1]
     if not shutil.which('git') or not (root / '.git').exists():
@@ -92,10 +92,10 @@ def kept():
 
 
 @pytest.fixture
-def copy(kept, tmp_path):
+def copy(tracked, tmp_path):
     """Return a copy of what git keeps, in the sources of a workspace."""
     folder = tmp_path / 'src' / 'linkage_ros'
-    for file in kept:
+    for file in tracked:
         target = folder / file.relative_to(Path(__file__).parents[1])
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(file, target)
@@ -108,12 +108,12 @@ def setup_arguments(monkeypatch):
     import setuptools
 
     def arguments(command):
-        found = {}
+        arguments_ = {}
         monkeypatch.chdir(Path(__file__).parents[1])
         monkeypatch.setattr('sys.argv', ['setup.py', command])
-        monkeypatch.setattr(setuptools, 'setup', found.update)
+        monkeypatch.setattr(setuptools, 'setup', arguments_.update)
         runpy.run_path('setup.py')
-        return found
+        return arguments_
 
     return arguments
 

@@ -358,11 +358,11 @@ class Listener:
         """Gather what has arrived."""
         while True:
             with self.subscription.handle:
-                taken = self.subscription.handle.take_message(self.kind, False)
-            if taken is None:
+                message = self.subscription.handle.take_message(self.kind, False)
+            if message is None:
                 return
-            self.arrived.append(taken[0])
-            for marker in getattr(taken[0], 'markers', ()):
+            self.arrived.append(message[0])
+            for marker in getattr(message[0], 'markers', ()):
                 if marker.action != Marker.DELETE:
                     self.deleted.discard(marker.id)
                 else:
@@ -878,5 +878,4 @@ SCENES = {
         'ankle.loads': ['pitch=12.0', 'roll=-3.0']},
     'tiny and huge': {
         'mechanisms': ['m', 'n'], 'm.type': 'jansen', 'm.scale': 1e-30, 'n.type': 'peaucellier',
-        'n.scale': 1e27},
-}
+        'n.scale': 1e27}}

@@ -101,9 +101,9 @@ def values(mechanism, count):
 def test_poses_and_rates_are_those_of_python(library, mechanisms, name, count):
     mechanism = mechanisms[name]
     inputs = values(mechanism, count)
-    (found, whole), poses = solved(library, mechanism, inputs), expected(mechanism, inputs)
+    (results, whole), poses = solved(library, mechanism, inputs), expected(mechanism, inputs)
     assert whole == np.isfinite(poses[:, :len(fields(mechanism))]).all(axis=1).tolist()
-    np.testing.assert_allclose(found, poses, rtol=1e-15, atol=0.0)
+    np.testing.assert_allclose(results, poses, rtol=1e-15, atol=0.0)
 
 
 @pytest.mark.parametrize('name, single, lines', [
@@ -195,7 +195,7 @@ def check_nearest(mechanism, invert, output, inputs=None, nears=None, beside=Non
         rng.uniform(size=12) if parts is None else parts), low, high)
     turn = settings.input.is_angle * math.tau
     beside = beside or rng.uniform(-0.3, 0.3, 2) * (high - low) + turn * rng.integers(-3, 4, 2)
-    taken = []
+    counts = []
 
     def out(inputs):
         return linkage.joint_angles(np.divide(inputs, unit), [output])[output]
@@ -205,14 +205,14 @@ def check_nearest(mechanism, invert, output, inputs=None, nears=None, beside=Non
         value = out([theta, np.nextafter(theta, 0.5 * (low + high))]).mean()
         for near in nears or theta + np.array(beside):
             answer, poses = invert(value * size, near)
-            taken.append(poses)
+            counts.append(poses)
             best = linkage.input_for(output, value, near / unit) * unit
             assert abs(answer - near) == pytest.approx(abs(best - near), abs=1e-6)
-            gap = out(answer * (1.0 + 2e-16 * np.arange(-4, 5))) - value
-            gap -= linkage.is_angle(output) * math.tau * np.round(gap / math.tau)
-            assert size * np.nanmin(np.abs(gap)) <= close * max(1.0, size * linkage.longest)
+            errors = out(answer * (1.0 + 2e-16 * np.arange(-4, 5))) - value
+            errors -= linkage.is_angle(output) * math.tau * np.round(errors / math.tau)
+            assert size * np.nanmin(np.abs(errors)) <= close * max(1.0, size * linkage.longest)
     # Away from ends a closed form is checked, and so is a series: neither is corrected.
-    assert parts is not None or close > 2e-14 or max(taken) == 1
+    assert parts is not None or close > 2e-14 or max(counts) == 1
     for value in (1e3, -1e3, math.nan, math.inf):
         assert linkage.is_angle(output) and math.isfinite(value) or not invert(value, 0.0)[0]
 
@@ -222,12 +222,12 @@ def test_several_inputs_are_found_for_as_many_outputs(mechanisms, inverses):
     linkage, rng = five_bar.linkage, np.random.default_rng(5)
     for _ in range(100):
         near, place = rng.uniform(-2.0, 2.0, 2), rng.uniform(-0.1, 0.2, 2)
-        answers, (found, _) = linkage.inverse(['P.x', 'P.y']).all(place, near), invert(place, near)
-        assert (found is not None) == bool(answers)
+        answers, (pose, _) = linkage.inverse(['P.x', 'P.y']).all(place, near), invert(place, near)
+        assert (pose is not None) == bool(answers)
         if answers:
-            away = [np.abs(np.array(answer.inputs) - near).sum() for answer in answers]
-            assert np.abs(found - near).sum() == pytest.approx(min(away), abs=1e-8)
-            np.testing.assert_allclose(linkage.solve(found, ['P'])['P'], place, atol=1e-14)
+            distances = [np.abs(np.array(answer.inputs) - near).sum() for answer in answers]
+            assert np.abs(pose - near).sum() == pytest.approx(min(distances), abs=1e-8)
+            np.testing.assert_allclose(linkage.solve(pose, ['P'])['P'], place, atol=1e-14)
     # Without a closed form a search may miss.
     with pytest.raises(ValueError, match='bent have no inverse in closed form'):
         header.written(mechanisms['bent'], ('C.x', 'angle(O,C)'))
@@ -259,12 +259,12 @@ def test_single_precision_is_as_good_as_the_page_says(mechanisms, tmp_path, name
     (low, high), = mechanism.first.reach
     edge, points = 0.01 * (high - low), 2 * len(mechanism.linkage.points)
     inputs = rng.uniform(low + edge, high - edge, (300, 1)).astype(np.float32)
-    found, _ = solved(compiled(tmp_path, [mechanism], single=True), mechanism, inputs, np.float32)
+    rows, _ = solved(compiled(tmp_path, [mechanism], single=True), mechanism, inputs, np.float32)
     exact, size = expected(mechanism, inputs.astype(float)), mechanism.scale
-    assert np.abs(found[:, :points] - exact[:, :points]).max() < (
+    assert np.abs(rows[:, :points] - exact[:, :points]).max() < (
         1e-6 * size * mechanism.linkage.longest)
     # So are angles and rates.
-    np.testing.assert_allclose(found[:, points:], exact[:, points:], rtol=1e-3, atol=1e-3)
+    np.testing.assert_allclose(rows[:, points:], exact[:, points:], rtol=1e-3, atol=1e-3)
 
 
 def test_the_sketch_has_the_header_of_its_scene():
@@ -314,8 +314,7 @@ def named(number):
     return text
 
 
-@pytest.mark.parametrize('number', [
-    'double', pytest.param('float', marks=pytest.mark.nightly)])
+@pytest.mark.parametrize('number', ['double', pytest.param('float', marks=pytest.mark.nightly)])
 @pytest.mark.parametrize('compiler, language', [pytest.param(
     compiler, language, marks=pytest.mark.skipif(
         not shutil.which(compiler), reason=f'{compiler} is not installed'))
@@ -340,14 +339,14 @@ def test_linters_find_nothing():
     assert ended.returncode == 0, ended.stdout + ended.stderr
 
 
-@pytest.mark.parametrize('arguments, said', [
+@pytest.mark.parametrize('arguments, reason', [
     (['all', '--mechanism', 'arm'], "there is no mechanism 'arm'; allowed: water_drop"),
     (['all', '--mechanism', 'jansen', '--output', 'arm'], 'jansen has no'),
     (['excavator', '--output', 'C.x'], 'excavator has 3 inputs: as many outputs are needed, '),
     (['nowhere'], 'No such file'),
     ([], 'the following arguments are required: SCENE')])
-def test_what_cannot_be_is_one_sentence(capsys, arguments, said):
+def test_what_cannot_be_is_one_sentence(capsys, arguments, reason):
     scenes = [str(ROOT / 'config' / f'{arguments[0]}.yaml')] if arguments else []
     assert cli.main(scenes + arguments[1:]) == 1
     printed = capsys.readouterr().err
-    assert printed.startswith('c_code: ') and printed.count('\n') == 1 and said in printed
+    assert printed.startswith('c_code: ') and printed.count('\n') == 1 and reason in printed

@@ -146,5 +146,5 @@ def test_threads_are_the_first_to_ask_a_linkage_all_at_once():
     expected = [question(fresh(0)) for question in questions]
     for number in range(1, 3):
         for legs in ([fresh(number) for _ in questions], [fresh(number + 10)] * len(questions)):
-            for found, true in zip(at_once(*map(partial, questions, legs)), expected):
-                assert np.array_equal(found, true, equal_nan=True)
+            for results, true in zip(at_once(*map(partial, questions, legs)), expected):
+                assert np.array_equal(results, true, equal_nan=True)

@@ -100,7 +100,7 @@ def test_what_is_no_number_is_refused_with_its_name(bars, arm, wrong):
 
 @pytest.mark.parametrize('wrong', [
     'x', None, {}, object(), [[1.0], 'x'], True, math.nan, 'distance(A,A)', 'distance(A,Z)',
-    'angle(A)', 'angle(A,B,C)', 'distance(A, B)', 'A.z', '', 'distance', '(A,B)', 7,
+    'angle(A)', 'angle(A,B,C)', 'distance(A, B)', 'A.z', '', 'distance', '(A,B)', 7, 1, -1, 1.0,
     np.array(['QB', 'AB'])])
 def test_what_is_no_output_joint_or_package_is_refused_with_its_name(bars, wrong):
     assert not bars.has_output(wrong) and not bars.moves(wrong)
@@ -112,7 +112,8 @@ def test_what_is_no_output_joint_or_package_is_refused_with_its_name(bars, wrong
             (lambda: bars.extremes('QB', [wrong]), 'arcs must be'),
             (lambda: bars.function(xp='x' if wrong is None else wrong), 'xp must be a package'),
             (lambda: bars.inverse('QB').function(wrong), 'xp must be a package'),
-            (lambda: bars.velocity(0.1, by=wrong), 'by must be the number of an input, from 0'),
+            *((lambda by=by: by(0.1, by=wrong), 'by must be the number of an input, from 0')
+              for by in (bars.velocity, bars.joint_rates)),
             (lambda: RODS.is_angle(wrong), 'allowed: O, S, O_origin.x'),
             (lambda: LEVER.mechanisms['lever'].assembly().solution((), (wrong,)), 'joint'),
             (lambda: bars.driven_by(wrong), 'can be driven by 1 of none in a plane, not by'),
@@ -141,12 +142,11 @@ def test_pieces_of_the_first_of_several_inputs_are_for_others_that_are_given(arm
 def test_there_are_as_many_numbers_as_inputs(bars, arm):
     one, two = bars.inverse('QB'), arm.inverse(('P.x', 'P.y'))
     for linkage, name, asks in (
-            (bars, 'values', (lambda x: one.nearest(x), lambda x: one.all(x), lambda x: one.path(
-                x), lambda x: one.over(*x))),
+            (bars, 'values', (one.nearest, one.all, one.path, lambda x: one.over(*x))),
             (bars, 'near', (lambda x: one.nearest(0.7, x), lambda x: one.all(0.7, x),
                             lambda x: one.path([[0.7]], x))),
-            (arm, 'values', (lambda x: two.nearest(x), lambda x: two.all(x), lambda x: two.path(
-                x), lambda x: two.over(*x))),
+            (arm, 'values', (two.nearest, two.all, two.path, lambda x: two.over(*x),
+                             lambda x: two.follow(x, [0.1, 0.1]))),
             (arm, 'near', (lambda x: two.nearest([0.1, 0.1], x), lambda x: two.path(
                 [[0.1], [0.1]], x), lambda x: two.follow([0.1, 0.1], x)))):
         for call in asks:
@@ -280,7 +280,7 @@ def custom(made):
 
 
 # What is asked with names, which a function makes of texts.
-ASKED = {
+CALLS = {
     'dimensions': lambda made: mechanisms.create(made('jansen'), **{made('m'): 14.0}).dimensions,
     'changed dimensions': lambda made: mechanisms.create('jansen').with_dimensions(
         **{made('m'): 14.0}).dimensions,
@@ -304,9 +304,9 @@ ASKED = {
 
 
 @pytest.mark.parametrize('made', [np.str_, member])
-@pytest.mark.parametrize('what', ASKED)
+@pytest.mark.parametrize('what', CALLS)
 def test_what_is_asked_by_names_of_any_class_is_the_same(made, what):
-    first, later = ASKED[what](made), ASKED[what](str)
+    first, later = CALLS[what](made), CALLS[what](str)
     assert first == later and len(first) > 0
     # Nor are later callers given names of that class.
     assert all(type(each) is str for each in (*first, *later) if isinstance(each, str))

@@ -82,8 +82,7 @@ def test_the_scene_without_names_is_of_the_size_of_a_table():
     (lambda: mechanisms.create('custom', joints=['O ground 0 0'] * 2001), 'joints must be up to'),
     (lambda: mechanisms.create('custom', joints=['O ground 0 0', 'H ground 1 0', 'A crank O 1', *(
         f'm{number} mirrored O H' for number in range(40))]),
-     'joint line "m10 mirrored O H": a linkage has up to 2000 lines, images included$'),
-])
+     'joint line "m10 mirrored O H": a linkage has up to 2000 lines, images included$')])
 def test_what_is_no_mechanism_is_refused_with_what_is_allowed(call, reason):
     with pytest.raises(ValueError, match='^' + reason):
         call()

@@ -76,7 +76,7 @@ def placed(mechanism, axes, inputs):
     return values * factor + offset
 
 
-def away(axes, positions, others):
+def error(axes, positions, others):
     """Return how far positions are from others, in sizes, the shorter way round."""
     size, turn = np.transpose([(each.size, each.turn) for each in axes])
     gap = positions - others
@@ -84,7 +84,7 @@ def away(axes, positions, others):
     return np.abs(gap / size).max(axis=-1)
 
 
-def asked(library, case, number):
+def check_commands(library, case, number):
     """Return how many questions are put to a linkage, and what is wrong with the answers."""
     mechanism, rng, slack = case.mechanism, np.random.default_rng(1), SLACK[number]
     memory = Memory(library, mechanism, np.float32 if number == 'float' else float)
@@ -102,9 +102,9 @@ def asked(library, case, number):
 
     def measured(actuator, joint):
         """Return the joints that C measures, or None if they are not those of Python."""
-        status, (found, *_) = memory.send(0, actuator)
+        status, (solved, *_) = memory.send(0, actuator)
         is_there = not status & (3 if number == 'float' else 1)
-        return found if is_there and away(sides[1], found, joint) <= NEAR[number] else None
+        return solved if is_there and error(sides[1], solved, joint) <= NEAR[number] else None
 
     for i in np.flatnonzero(np.isfinite(joint + actuator + commanded + goal).all(axis=1)):
         poses = measured(goal[i], commanded[i]), measured(actuator[i], joint[i])
@@ -112,14 +112,14 @@ def asked(library, case, number):
             # In single precision it may be singular, or next to a dead point or an end.
             wrong += [f'measured {i}'] * (number == 'double')
             continue
-        status, (found, *_) = memory.send(1, poses[1])
-        if status & 1 or away(sides[0], found, actuator[i]) > slack:
+        status, (solved, *_) = memory.send(1, poses[1])
+        if status & 1 or error(sides[0], solved, actuator[i]) > slack:
             wrong.append(f'pose {i}')
         memory.send(0, actuator[i])
-        status, (found, *_) = memory.send(1, poses[0])
+        status, (solved, *_) = memory.send(1, poses[0])
         # Another pose that is as near is an answer, too.
-        if status & 1 or away(sides[0], found, goal[i]) > slack and away(
-                sides[0], found, actuator[i]) > slack + 2 * away(sides[0], goal[i], actuator[i]):
+        if status & 1 or error(sides[0], solved, goal[i]) > slack and error(
+                sides[0], solved, actuator[i]) > slack + 2 * error(sides[0], goal[i], actuator[i]):
             wrong.append(f'beside {i}')
         count += 2
     return count, wrong
@@ -129,7 +129,7 @@ def questions(folder, cases, number):
     """Return how many questions were put to each case, and raise if an answer was wrong."""
     folder.mkdir(parents=True, exist_ok=True)
     library = loaded(folder, memories(cases, number == 'float'), '-O1')
-    answers = {case.mechanism.name: asked(library, case, number) for case in cases}
+    answers = {case.mechanism.name: check_commands(library, case, number) for case in cases}
     assert {name: wrong for name, (_, wrong) in answers.items() if wrong} == {}
     return [count for count, _ in answers.values()]
 
@@ -163,10 +163,10 @@ def test_the_ends_of_sweeps_can_be_commanded(tmp_path, number):
         memory = Memory(library, case.mechanism, kind)
         places = np.array([end, end - 1e-3 * inwards])
         at_end, beyond = case.mechanism.linkage.joint_angles(places, [output])[output]
-        found = np.array(cranks(memory, case, output, at_end))
+        inputs = np.array(cranks(memory, case, output, at_end))
         (low, high), = np.array(case.mechanism.ends, kind)
-        assert ((low <= found.astype(kind)) & (found.astype(kind) <= high)).all()
-        off = case.mechanism.linkage.joint_angles(found, [output])[output] - at_end
+        assert ((low <= inputs.astype(kind)) & (inputs.astype(kind) <= high)).all()
+        off = case.mechanism.linkage.joint_angles(inputs, [output])[output] - at_end
         assert (np.abs(off) < (CLOSE[number], CLOSE['double'])).all()
         if distance == 0.1:
             assert np.isnan(cranks(memory, case, output, beyond)).all()

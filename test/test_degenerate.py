@@ -77,15 +77,6 @@ def test_a_dead_point_at_zero_is_zero(lengths, expected):
     assert mechanisms.create('four_bar', **lengths).dead_points() == expected
 
 
-@pytest.mark.parametrize('line', [1.0, 1j, -1.0, -1j, -0.6 + 0.8j])
-def test_a_block_passes_its_change_points_whichever_way_its_line_goes(line):
-    engine = custom('O ground 0 0', 'G ground x y', 'A crank O 1', 'B slider A 1 O along G out',
-                    x=line.real, y=line.imag)
-    for theta in np.linspace(-3.0, 3.0, 13):
-        block = 2.0 * math.cos(theta - np.angle(line)) * line
-        assert engine.solve(theta)['B'] == pytest.approx([block.real, block.imag], abs=1e-14)
-
-
 def test_no_rounding_of_a_ground_square_to_the_crank_changes_a_branch():
     bars = [custom('O ground 0 0', f'Q ground {x} 4', 'A crank O 1', 'B dyad A Q 5 2 left')
             for x in ('-1e-16', '0', '1e-16')]

@@ -46,13 +46,13 @@ def anchors(page):
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
-def test_every_link_inside_the_repository_leads_somewhere(page, kept):
+def test_every_link_inside_the_repository_leads_somewhere(page, tracked):
     for link in LINK.findall(FENCE.sub('', page.read_text())):
         if not re.match(r'\w+:', link):
             path, _, place = link.partition('#')
             target = (page.parent / path).resolve() if path else page
             assert target.exists() or target in MADE, link
-            assert target.suffix not in ('.png', '.gif', '.svg') or target in kept, link
+            assert target.suffix not in ('.png', '.gif', '.svg') or target in tracked, link
             assert not place or target.suffix != '.md' or place in anchors(target), link
 
 

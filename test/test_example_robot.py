@@ -59,53 +59,52 @@ class Robot:
 
 
 @pytest.fixture(scope='module')
-def told():
+def states():
     """Return the joints on the topic at poses all over the motors' range, board after board."""
     with Graph() as graph:
-        robot, rng, found = Robot(graph), np.random.default_rng(13), []
+        robot, rng, positions = Robot(graph), np.random.default_rng(13), []
         for part in [0.0, 1.0, *rng.uniform(size=POSES)]:
             for motors, ends in BOARDS.items():
                 at = ends @ ([1.0 - part, part] if part in (0.0, 1.0) else rng.dirichlet([1, 1]))
-                found.append(robot.turn(motors, list(at)))
+                positions.append(robot.turn(motors, list(at)))
         # A message of one motor out of two moves that one.
-        found.append(robot.turn(('hip_motor',), [1.0]))
-        return found
+        positions.append(robot.turn(('hip_motor',), [1.0]))
+        return positions
 
 
 @pytest.mark.parametrize('library', LIBRARIES)
-def test_the_loops_of_the_urdf_are_closed_at_every_pose(told, library):
+def test_the_loops_of_the_urdf_are_closed_at_every_pose(states, library):
     robot = library(URDF)
-    for state in told:
+    for state in states:
         if len(state) == len(robot.joints):
             places = robot.places(state, [frame for loop in LOOPS for frame in loop])
             for eye, pin in LOOPS:
                 assert np.abs(places[eye] - places[pin]).max() < 1e-12
 
 
-def test_every_joint_is_told_and_stays_within_the_limits_of_the_urdf(told):
-    assert len(told) == 2 * POSES + 5 and set(told[0]) < set(told[-1]) == set(JOINTS)
+def test_every_joint_is_told_and_stays_within_the_limits_of_the_urdf(states):
+    assert len(states) == 2 * POSES + 5 and set(states[0]) < set(states[-1]) == set(JOINTS)
     limits = {name: [float(limit.get(end)) for end in ('lower', 'upper')]
               for name, joint in JOINTS.items() if (limit := joint.find('limit')) is not None}
     assert len(limits) == 7
     for name, (low, high) in limits.items():
-        positions = [state[name] for state in told if name in state]
+        positions = [state[name] for state in states if name in state]
         assert low < min(positions) < max(positions) < high
         assert np.ptp(positions) > 0.4 * (high - low)
 
 
-def test_gears_have_their_ratios_and_a_partial_message_moves_its_motor_alone(told):
-    for state in told[2:]:
+def test_gears_have_their_ratios_and_a_partial_message_moves_its_motor_alone(states):
+    for state in states[2:]:
         for name, crank, ratio in (('abduction', 'abduction_crank', 20.0),
                                    ('hip', 'hip_pitch', 8.0), ('knee', 'knee_crank', -10.0)):
             assert state[crank] == pytest.approx(state[f'{name}_motor'] / ratio, abs=1e-15)
-    before, after = told[-2:]
+    before, after = states[-2:]
     assert {name for name in after if after[name] != before[name]} == {'hip_motor', 'hip_pitch'}
 
 
 @pytest.mark.parametrize('name, motor, base', [
     ('abduction', 'abduction_motor', 'torso'), ('knee', 'knee_motor', 'thigh')])
-def test_markers_stay_on_the_link_that_the_loop_stands_on_wherever_it_is(
-        graph, name, motor, base):
+def test_markers_stay_on_the_link_that_the_loop_stands_on_wherever_it_is(graph, name, motor, base):
     robot, urdf = Robot(graph), FIRST(URDF)
     drawn = graph.listen(MarkerArray, f'{name}/markers')
     for at in (-4.0, 4.0):
@@ -118,12 +117,12 @@ def test_markers_stay_on_the_link_that_the_loop_stands_on_wherever_it_is(
 
 
 def test_a_simulated_motor_says_what_the_real_one_would(graph):
-    states = graph.listen(JointState, 'joint_states')
+    messages = graph.listen(JointState, 'joint_states')
     graph.start(Kinematics, cli_args=ARGS)
     graph.start(CrankDriver, cli_args=ARGS)
-    graph.until(lambda: {name for state in states for name in state.name} == set(JOINTS))
-    for state in states:
-        assert set(state.name) in (MOTORS, PASSIVE) and len(state.velocity) == len(state.name)
+    graph.until(lambda: {name for message in messages for name in message.name} == set(JOINTS))
+    for message in messages:
+        assert {*message.name} in (MOTORS, PASSIVE) and len(message.velocity) == len(message.name)
 
 
 @pytest.mark.nightly

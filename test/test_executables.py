@@ -93,17 +93,16 @@ ARGUMENTS = [
     (['--ros-args', '--bar'], 'bad arguments: .*--bar'),
     (['--ros-args', '-p', 'rate'], "bad arguments: .*Couldn't parse parameter override"),
     (['--ros-args', '-r', '__ns:=two words'], 'bad arguments: .*remap'),
-    (['--ros-args', '--params-file', 'nowhere.yaml'], 'bad arguments: .*nowhere.yaml'),
-]
+    (['--ros-args', '--params-file', 'nowhere.yaml'], 'bad arguments: .*nowhere.yaml')]
 
 
-@pytest.mark.parametrize('name, arguments, said', [
+@pytest.mark.parametrize('name, arguments, reason', [
     *((name, *row) for name in NODES for row in ARGUMENTS),
     ('scene', ['--ros-args', '-p', 'mechanisms:=[leg]'], 'leg.type must be a text'),
     ('viewer', ['--ros-args', '-p', 'use_sim_time:=5'], "'use_sim_time' to '5'")])
-def test_arguments_that_there_are_not_end_in_one_sentence(capfd, name, arguments, said):
+def test_arguments_that_there_are_not_end_in_one_sentence(capfd, name, arguments, reason):
     main = import_module(module(name)).main
     assert main([name, *arguments]) == 1
     printed = capfd.readouterr().err
     fatal, = (line for line in printed.splitlines() if '[FATAL]' in line)
-    assert re.search(said, fatal) and len(fatal) < 400 and 'Traceback' not in printed
+    assert re.search(reason, fatal) and len(fatal) < 400 and 'Traceback' not in printed

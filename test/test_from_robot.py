@@ -187,7 +187,7 @@ def test_what_was_decided_is_said(tmp_path, file, changes, args, line):
 def test_all_that_is_printed_of_a_robot():
     # By its keyframe, the crank is 0.7 rad from upright.
     _, out, err = (each if isinstance(each, int) else re.sub(
-        r'-?\d+\.\d+', lambda found: repr(round(float(found[0]), 7) + 0.0),
+        r'-?\d+\.\d+', lambda match: repr(round(float(match[0]), 7) + 0.0),
         re.sub(r'\b\de-1\d m', '0 m', each)) for each in printed('four_bar.xml'))
     assert out == (ROBOTS / 'four_bar_scene.yaml').read_text().format(file=ROBOTS / 'four_bar.xml')
     assert err == f'from_robot: {out.splitlines()[3][2:]}\n'
@@ -307,12 +307,12 @@ def test_all_legs_that_are_undecided_are_asked_in_one_run(tmp_path, count):
     line = refused(file)
     sides = choices(line)
     assert line.count(' as with ') == count and len(sides) == 2
-    found = []
+    runs = []
     for side in sides:
         code, out, err = printed(file, *side)
         assert code == 0 and 'loops stand open by' in err and 'Left out' not in err
-        found.append(out)
-    assert found[0] != found[1]
+        runs.append(out)
+    assert runs[0] != runs[1]
 
 
 @pytest.mark.parametrize('low', [-0.1, 0.2])
@@ -391,7 +391,7 @@ def test_no_answer_depends_on_the_starts_of_a_search(tmp_path, name, seeds):
     def answer(seed):
         made = closing.closed(robot, seed)
         # A pose at a dead point has half of the digits.
-        faults = {re.sub(r'-?\d+\.\d+', lambda found: f'{float(found[0]):.2f}', str(why))
+        faults = {re.sub(r'-?\d+\.\d+', lambda match: f'{float(match[0]):.2f}', str(why))
                   for why in made.faults.values()}
         # A rod on balls spins freely.
         return faults, made.report, {} if faults else {

@@ -17,8 +17,8 @@ from scenes import alone
 RATIOS = {'1/64': 64, '1/80': 80, '1/100': 100, '0.31': 100, '22/7': 7, '3/7': 7, '-2.37': 100,
           '0.999': 1000, '1/1000': 1000, '0.12345': 20000, '2/3+1/7919': 23757,
           'sqrt(2)': math.inf, 'pi': math.inf, '8': 1, '180': 1, '-1000': 1}
-# Turns of the motor in which is asked.
-TURNS = 0.0, 15.95, -1e5
+# Turns of the motor in which is asked, one of them next to an end of what is computed as one.
+TURNS = 0.0, 15.93713, -1e5
 
 # A fraction, a ratio that never repeats and a speed-up.
 QUICK = '1/3', 'sqrt(2)', '8'
@@ -57,15 +57,15 @@ def test_a_pose_is_answered_in_the_turn_in_which_it_is(ratio):
             value, rate = (float(call(theta, (output,))[output])
                            for call in (linkage.joint_angles, linkage.joint_rates))
             close = 1e-9 + 8.0 * size * math.ulp(theta) / min(1.0, abs(rate))
-            assert linkage.input_for(output, value, near=theta) == pytest.approx(
+            assert linkage.input_for(output, value, near=theta - 0.01) == pytest.approx(
                 theta, abs=close), output
             assert linkage.follow(output, value, theta)[0] == pytest.approx(theta, abs=close)
             (many,), _ = linkage.inverse(output).nearest(([value] * 2,), ([theta, theta],))
             assert many == pytest.approx([theta] * 2, abs=close)
             (first, *_) = linkage.inverse(output).all(value, theta)
             assert first.inputs[0] == pytest.approx(theta, abs=close)
-            away = linkage.joint_angles(first.inputs[0], (output,))[output] - value
-            assert math.remainder(away, math.tau) == pytest.approx(
+            error = linkage.joint_angles(first.inputs[0], (output,))[output] - value
+            assert math.remainder(error, math.tau) == pytest.approx(
                 0.0, abs=1e-12 + 8.0 * size * math.ulp(theta))
 
 
@@ -108,10 +108,10 @@ def test_the_reach_is_where_it_can_be_assembled(ratio, lines):
         'O ground 0 0', 'Q ground 2 0', 'A crank O 1', *lines.format(ratio).split('; ')])
     first, = linkage.inputs
     theta = np.random.default_rng(0).uniform(first.low, first.high, 4001)
-    whole = np.isfinite(linkage.solve(theta)['B']).all(axis=1)
-    assert whole.any() and not whole.all()
+    assembled = np.isfinite(linkage.solve(theta)['B']).all(axis=1)
+    assert assembled.any() and not assembled.all()
     reach = linkage.reach()
-    wrong = theta[[first.on(reach, x) for x in theta.tolist()] != whole]
+    wrong = theta[[first.on(reach, x) for x in theta.tolist()] != assembled]
     ends = np.ravel(reach)
     assert all(np.min(np.abs(ends - value)) < 1e-6 for value in wrong)
     assert len(wrong) < 5

@@ -91,10 +91,10 @@ def test_a_scene_with_any_history_is_what_its_values_read_anew_make(history):
     made = scene.read(PAIR)
     for change in history:
         before = made.parameters
-        found, new = outcome(scene.changed, made, change)
+        result, new = outcome(scene.changed, made, change)
         # All that was not changed keeps its value, defaults, too.
         values = {parameter.name: parameter.value for parameter in before}
-        assert found == outcome(scene.read, {**values, **change})[0]
+        assert result == outcome(scene.read, {**values, **change})[0]
         assert made.parameters == before
         made = new or made
 

@@ -269,14 +269,14 @@ def steps(title):
     """Return the numbered steps of a recipe, each with the code under it."""
     page = (DOCS / 'design' / 'architecture.md').read_text()
     recipe = page.partition(f'### {title}\n')[2].partition('\n##')[0]
-    found = []
+    blocks_ = []
     for step in re.split(r'^\d+\. ', recipe, flags=re.MULTILINE)[1:]:
         text, _, rest = step.partition('```')
         indent = len(text) - len(text.rstrip(' '))
         language, _, code = rest.partition('```')[0].partition('\n')
         lines = [line[indent:] for line in code.rstrip(' ').splitlines()]
-        found.append((' '.join(text.split()), language, '\n'.join(lines) + '\n'))
-    return found
+        blocks_.append((' '.join(text.split()), language, '\n'.join(lines) + '\n'))
+    return blocks_
 
 
 def follow(folder, text, language, code):

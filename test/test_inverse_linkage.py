@@ -3,9 +3,7 @@
 
 """The inverse linkage: what comes apart, its joint lines, and that its answers are all."""
 
-from copy import deepcopy
 import math
-import pickle
 
 from linkage_ros import mechanisms
 import numpy as np
@@ -44,14 +42,6 @@ def test_the_joint_lines_of_an_inverse_are_printed():
 def test_joint_angles_and_slides_come_apart(kind, outputs):
     linkage = mechanisms.create(kind)
     assert {name for name in outputs if linkage.inverse(name).closed} == outputs
-
-
-@pytest.mark.parametrize('by', [-1, 2, 'crank2', 1.0, None, True])
-def test_an_input_that_there_is_not_is_refused(by):
-    linkage = mechanisms.create('five_bar')
-    for call in (linkage.velocity, linkage.joint_rates):
-        with pytest.raises(ValueError, match='by must be the number of an input, from 0 to 1'):
-            call((1.0, 2.0), None, by)
 
 
 def test_an_output_that_only_rounding_moves_has_no_answers():
@@ -134,13 +124,6 @@ def test_the_default_of_several_inputs_does_not_depend_on_rounding():
 def test_ends_are_two_finite_numbers_in_order(ends):
     with pytest.raises(ValueError, match='ends must be two finite numbers in order'):
         mechanisms.create('four_bar').servo_for('B.x', 100.0, ends=ends)
-
-
-def test_answers_go_to_other_processes():
-    answers = mechanisms.create('five_bar').inputs_for(('P.x', 'P.y'), (0.05, 0.15))
-    for each in (pickle.loads(pickle.dumps(answers)), deepcopy(answers)):
-        assert [(answer.inputs, answer.mode) for answer in each] == [
-            (answer.inputs, answer.mode) for answer in answers]
 
 
 def test_a_value_at_which_equal_bars_of_the_inverse_lie_on_each_other_is_answered():

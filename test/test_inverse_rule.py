@@ -64,8 +64,7 @@ SPECIAL = {
     'a gear without a place where the input is zero': (
         ['A ground 0 0', 'B ground 0.4 0', 'C cylinder A B 0.3 left',
          'D carriage B along A -0.7 -0.2 geared cylinder -1.5 0.2 called drive',
-         'E dyad D A 0.6 0.5 left'], {}, ['AE'], np.linspace(0.28, 0.58, 7)),
-}
+         'E dyad D A 0.6 0.5 left'], {}, ['AE'], np.linspace(0.28, 0.58, 7))}
 
 
 @pytest.mark.parametrize('special', SPECIAL)
@@ -208,5 +207,5 @@ def test_next_to_an_extreme_and_at_an_end_a_pose_is_found_with_another_input_hel
     for theta in [at] if at else np.ravel(linkage.reach(held)).tolist():
         value = float(linkage.joint_angles((theta, held), [output])[output])
         solutions = linkage.inverse((output, 'drive')).all((value, held))
-        away = min((abs(each.inputs[0] - theta) for each in solutions), default=1.0)
-        assert away < (1e-10 if at else 1e-12)
+        distance = min((abs(each.inputs[0] - theta) for each in solutions), default=1.0)
+        assert distance < (1e-10 if at else 1e-12)

@@ -200,11 +200,9 @@ class Hand:
 
 
 BAD = {
-    'a header alone': b'\0\1\0\0',
     'cut off': serialize_message(JointState(name=['jansen_crank'], position=[1.0]))[:30],
     'a name without end': (b'\0\1\0\0' + bytes(8)
-                           + struct.pack('<IxxxxII', 1, 1, 2 ** 32 - 9) + bytes(40)),
-}
+                           + struct.pack('<IxxxxII', 1, 1, 2 ** 32 - 9) + bytes(40))}
 
 
 @pytest.mark.parametrize('text', BAD.values(), ids=BAD)

@@ -89,8 +89,7 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('9 mirrored O Q', "'9' cannot name a joint"),
     ('m mirrored O X', 'joint X is not placed before'),
     ('m mirrored O', 'expected "NAME mirrored FIRST SECOND"'),
-    ('P' * 65 + ' ground 0 0', 'a letter, then up to 63 letters, digits and underscores'),
-])
+    ('P' * 65 + ' ground 0 0', 'a letter, then up to 63 letters, digits and underscores')])
 def test_a_wrong_line_is_refused_with_the_line_and_what_is_allowed(line, problem):
     *more, line = line.split('; ')
     shown = line if len(line) <= 60 else line[:57] + '...'
@@ -350,8 +349,7 @@ ROLES = {
     'parameter': lambda text: scene.read(four_bar_scene(**{f'f.{text}': 1.0})),
     'type in a scene': lambda text: scene.read({'mechanisms': ['f'], 'f.type': text}),
     'line in a scene': lambda text: scene.read(four_bar_scene(**{'f.joints': [*FOUR_BAR, text]})),
-    'points in a scene': lambda text: scene.read(four_bar_scene(**{'f.points': [text]})),
-}
+    'points in a scene': lambda text: scene.read(four_bar_scene(**{'f.points': [text]}))}
 
 
 OUTPUTS = {
@@ -364,8 +362,7 @@ OUTPUTS = {
     'function': lambda text: BAR.function((text,)),
     'crank angle': lambda text: BAR.input_for(text, 0.5),
     'changed dimension': lambda text: BAR.with_dimensions(**{text: 1.0}),
-    'changed value': lambda text: BAR.with_dimensions(b=text),
-}
+    'changed value': lambda text: BAR.with_dimensions(b=text)}
 BAR = made()
 # Where texts are read letter by letter.
 PARSED = ('line', 'number', 'length', 'angle')

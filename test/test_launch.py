@@ -25,8 +25,7 @@ LAUNCH = ROOT / 'launch' / 'scene.launch.py'
 MESSAGES = {
     'rviz_default_plugins/MarkerArray': 'visualization_msgs/msg/MarkerArray',
     'rviz_default_plugins/Marker': 'visualization_msgs/msg/Marker',
-    'rviz_default_plugins/RobotModel': 'std_msgs/msg/String',
-}
+    'rviz_default_plugins/RobotModel': 'std_msgs/msg/String'}
 DURABLE = {'TRANSIENT_LOCAL': 'Transient Local', 'VOLATILE': 'Volatile'}
 
 
@@ -38,13 +37,13 @@ def shown():
 
 def displays(config):
     """Return all displays, those in groups too, but not the groups."""
-    found, left = [], list(config['Visualization Manager']['Displays'])
+    displays_, left = [], list(config['Visualization Manager']['Displays'])
     while left:
         display = left.pop(0)
         left += display.get('Displays', ())
         if display['Class'] != rviz.GROUP:
-            found.append(display)
-    return found
+            displays_.append(display)
+    return displays_
 
 
 def topics(config):
@@ -173,8 +172,7 @@ def started(launch=LAUNCH, **arguments):
      4 * ['robot_state_publisher'] + ['viewer']),
     ({'scene': 'jansen', 'robot_model': 'True', 'viewer': 'False', 'frame_prefix': 'left'},
      ['robot_state_publisher', 'static_transform_publisher']),
-    ({'rviz': 'True', 'namespace': 'left'}, ['rviz2', 'static_transform_publisher', 'viewer']),
-])
+    ({'rviz': 'True', 'namespace': 'left'}, ['rviz2', 'static_transform_publisher', 'viewer'])])
 def test_the_launch_file_starts_the_nodes_of_a_scene(arguments, besides, monkeypatch, tmp_path):
     monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path))
     nodes = ['crank_driver', 'kinematics', 'servo_inverse'] if 'apart' in arguments else ['scene']

@@ -164,7 +164,7 @@ def test_elementary_functions_are_off_by_less_than_an_ulp_or_two(name, values, m
     assert off(name, numbers, by_lanes(name, numbers)) < most
 
 
-def asked(linkage, thetas):
+def quantities_of(linkage, thetas):
     """Return places and angles as one array, a row for each theta."""
     quantities = {**linkage.solve(thetas), **linkage.joint_angles(thetas)}
     return np.column_stack([values.reshape(thetas.size, -1) for values in quantities.values()])
@@ -175,10 +175,10 @@ def test_a_pose_is_the_same_in_any_array(kind):
     linkage = mechanisms.create(kind).accelerated()
     thetas = np.random.default_rng(2).uniform(-9.0, 9.0, 43)
     thetas[::7] = [1e300, math.nan, -1e9, math.inf, -0.0, 6e4, 0.0]
-    whole = asked(linkage, thetas)
+    whole = quantities_of(linkage, thetas)
     assert np.isfinite(whole).all(axis=1).sum() == thetas.size - 2
     for part in (slice(0, 1), slice(3, 10), slice(5, 13), slice(None, None, -1), slice(1, 40, 3)):
-        assert np.array_equal(asked(linkage, thetas[part]), whole[part], equal_nan=True)
+        assert np.array_equal(quantities_of(linkage, thetas[part]), whole[part], equal_nan=True)
     assert linkage.solve(thetas[:0])['A'].shape == (0, 2)
 
 
@@ -186,10 +186,10 @@ def test_a_pose_is_the_same_in_any_array(kind):
 def test_a_pose_is_the_same_on_any_number_of_cores():
     linkage = mechanisms.create('jansen').accelerated()
     thetas, cores = np.random.default_rng(3).uniform(-9.0, 9.0, MANY), os.sched_getaffinity(0)
-    on_all = asked(linkage, thetas)
+    on_all = quantities_of(linkage, thetas)
     os.sched_setaffinity(0, {min(cores)})
     try:
-        assert np.array_equal(asked(linkage, thetas), on_all)
+        assert np.array_equal(quantities_of(linkage, thetas), on_all)
     finally:
         os.sched_setaffinity(0, cores)
 

@@ -177,20 +177,20 @@ def test_after_a_slip_a_service_answers(graph, log, service, kind, request_):
     logged_once(graph, node, log)
 
 
-@pytest.mark.parametrize('topic, kind, answer, request_', [
+@pytest.mark.parametrize('topic, kind, answer, message', [
     ('wanted_states', JointState, 'servo_commands',
      JointState(name=['lever_lever'], position=[0.1])),
     ('wanted_trajectory', JointTrajectory, 'servo_trajectory', JointTrajectory(
         joint_names=['lever_lever'], points=[JointTrajectoryPoint(positions=[0.1])]))],
     ids=['wanted_states', 'wanted_trajectory'])
-def test_after_a_slip_the_next_command_is_given(graph, slips, log, topic, kind, answer, request_):
+def test_after_a_slip_the_next_command_is_given(graph, slips, log, topic, kind, answer, message):
     node = graph.start(ServoInverse, LEVER)
     publisher, answers = graph.publisher(kind, topic), graph.listen(kind, answer)
     graph.until(lambda: node.count_subscribers(answer))
     slips[answer] = 1
-    publisher.publish(request_)
+    publisher.publish(message)
     graph.until(lambda: not slips[answer])
-    publisher.publish(request_)
+    publisher.publish(message)
     graph.until(lambda: answers)
     logged_once(graph, node, log, topic)
 
@@ -227,8 +227,7 @@ def ends_quietly(process, number):
 @pytest.mark.parametrize('name, publishers', [
     ('crank_driver', 0), ('servo_inverse', 0), ('kinematics', 0), ('kinematics', 100),
     ('scene', 0), ('scene', 100)])
-def test_a_signal_ends_the_start_of_a_thousand_mechanisms(
-        tmp_path, name, publishers, number):
+def test_a_signal_ends_the_start_of_a_thousand_mechanisms(tmp_path, name, publishers, number):
     path = tmp_path / 'many.yaml'
     names = [f'm{i}' for i in range(1000)]
     path.write_text(f'/**:\n  ros__parameters:\n    mechanisms: [{", ".join(names)}]\n' + ''.join(

@@ -29,8 +29,7 @@ TRUTH = {
     'less': lambda x, y: gmpy2.mpfr(x < y), 'less_equal': lambda x, y: gmpy2.mpfr(x <= y),
     'where': lambda c, x, y: x if c < 0 else y,
     'root': lambda x, t: gmpy2.sqrt(x) if x > 0 else gmpy2.mpfr(0) if x >= -abs(t) else NAN,
-    'valid_where': lambda x, margin, t: x if margin >= -abs(t) else NAN,
-}
+    'valid_where': lambda x, margin, t: x if margin >= -abs(t) else NAN}
 # Ulps: of the C library, of numpy over arrays, of `elementary`; all else is rounded correctly.
 ELEMENTARY = {'sin': (1.0, 4.0, 1.0), 'cos': (1.0, 4.0, 1.0), 'atan2': (1.0, 4.0, 2.0)}
 SPECIAL = [0.0, -0.0, 1.0, -1.5, 2.5, math.inf, -math.inf, math.nan, 5e-324, 1e308]

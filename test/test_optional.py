@@ -22,8 +22,7 @@ WAYS = {
     'missing': "raise ModuleNotFoundError('No module named NAME', name='NAME')",
     'AttributeError': 'import sys; sys.version_infos',
     'empty': '',
-    'OSError': "raise OSError('libNAME.so: cannot open shared object file')",
-}
+    'OSError': "raise OSError('libNAME.so: cannot open shared object file')"}
 SCENE = str(CONFIG / 'jansen.yaml')
 # Commands that cannot do without a package.
 COMMANDS = {
@@ -34,8 +33,7 @@ COMMANDS = {
     'from_robot': (('mujoco',), 'robot_files', (str(ROBOTS / 'four_bar.xml'),)),
     'from_robot, loops': (('yaml',), 'robot_files', (
         str(ROBOTS / 'five_bar.urdf'), '--loops', str(ROBOTS / 'five_bar_loops.yaml'))),
-    'from_robot, scene': (('yaml',), 'robot_files', (str(ROBOTS / 'four_bar.sdf'),)),
-}
+    'from_robot, scene': (('yaml',), 'robot_files', (str(ROBOTS / 'four_bar.sdf'),))}
 # Modules that import optional packages; `test_rooms.py` holds that these are all.
 MODULES = tuple(f'linkage_ros.{name}' for name in (
     'formula.llvm_code', 'render.files', 'render.layers',
@@ -151,9 +149,9 @@ def test_a_node_moves_without_machine_code_and_says_why_once(harness, tmp_path, 
         process.interrupt(signal.SIGINT)
         code, printed = process.end()
     assert code == 0 and 'Traceback' not in printed
-    said = [line for line in printed.splitlines() if 'llvmlite' in line]
+    line, = [line for line in printed.splitlines() if 'llvmlite' in line]
     level = 'INFO' if way == 'missing' else 'WARN'
-    assert len(said) == 1 and f'[{level}]' in said[0] and optional.INSTALL['llvmlite'] in said[0]
+    assert f'[{level}]' in line and optional.INSTALL['llvmlite'] in line
 
 
 @pytest.mark.nightly(all_but=1)
@@ -161,14 +159,13 @@ def test_a_node_moves_without_machine_code_and_says_why_once(harness, tmp_path, 
 @pytest.mark.parametrize('package, name', [
     ('aiohttp', 'viewer'), ('linkage_interfaces', 'servo_inverse'),
     ('linkage_interfaces', 'scene')])
-def test_a_node_that_cannot_do_without_ends_in_one_sentence(
-        harness, tmp_path, package, name, way):
+def test_a_node_that_cannot_do_without_ends_in_one_sentence(harness, tmp_path, package, name, way):
     write(tmp_path, package, way)
     process = harness.Process(name, SCENE, first=tmp_path)
     code, printed = process.end()
-    said = [line for line in printed.splitlines() if '[FATAL]' in line]
+    lines = [line for line in printed.splitlines() if '[FATAL]' in line]
     assert code == 1 and 'Traceback' not in printed, printed
-    assert len(said) == 1 and said[0].endswith(optional.INSTALL[package])
+    assert len(lines) == 1 and lines[0].endswith(optional.INSTALL[package])
 
 
 @pytest.mark.nightly

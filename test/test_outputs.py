@@ -10,8 +10,8 @@ from linkage_ros import mechanisms
 import numpy as np
 import pytest
 
-ASKED = [('jansen', 'distance(A,G)'), ('jansen', 'angle(C,G)'), ('four_bar', 'distance(O,B)'),
-         ('four_bar', 'angle(B,A)'), ('slotted_lever', 'distance(Q,A)'), ('klann', 'angle(O,E)')]
+OUTPUTS = [('jansen', 'distance(A,G)'), ('jansen', 'angle(C,G)'), ('four_bar', 'distance(O,B)'),
+           ('four_bar', 'angle(B,A)'), ('slotted_lever', 'distance(Q,A)'), ('klann', 'angle(O,E)')]
 
 
 def measured(linkage, output, theta):
@@ -23,7 +23,7 @@ def measured(linkage, output, theta):
 
 
 @pytest.mark.parametrize('shape', [(), (1,), (3, 2), (0,)])
-@pytest.mark.parametrize('type_, output', ASKED)
+@pytest.mark.parametrize('type_, output', OUTPUTS)
 def test_distances_and_angles_are_those_of_the_joints(type_, output, shape):
     linkage = mechanisms.create(type_)
     theta = np.resize([0.3, 1.1, -2.0, 2.9, 0.0, -0.7], shape)
@@ -32,7 +32,7 @@ def test_distances_and_angles_are_those_of_the_joints(type_, output, shape):
     np.testing.assert_allclose(values_, measured(linkage, output, theta), rtol=1e-13, atol=1e-13)
 
 
-@pytest.mark.parametrize('type_, output', ASKED)
+@pytest.mark.parametrize('type_, output', OUTPUTS)
 def test_their_rates_are_differences(type_, output):
     linkage, step = mechanisms.create(type_), 1e-6
     theta = np.linspace(0.3, 2.5, 9)

@@ -127,8 +127,9 @@ def test_other_mechanisms_are_said_and_the_rest_is_followed(graph, warned):
 def test_of_values_that_change_and_change_back_the_last_holds(graph):
     service = graph.start(ServoInverse, LEVER)
     announce, other, scale = graph.announcer(), graph.announcer('/other'), 'lever.scale'
+    # What can be set only at the start is not followed.
     for values in ({'mechanisms': ['lever'], A: 80.0, scale: 1.0}, {A: 90.0}, {A: 80.0},
-                   {scale: 2.0}):
+                   {scale: 2.0, 'lever.type': 'jansen'}):
         # Those of another node are none of its business.
         other({A: 95.0})
         announce(values)

@@ -79,8 +79,8 @@ def pins(file):
     """Return (package, version, whether there is a hash) of each line of a requirement file."""
     pin = re.compile(r'([\w.-]+)(?:\[\w+\])?==([\w.+!]+)(.*--hash=sha256:[0-9a-f]{64})?')
     lines = without_comments(file.read_text()).replace('\\\n', ' ').splitlines()
-    found = [pin.match(line).groups() for line in lines if line.strip()]
-    return [(name.lower(), version, bool(hashed)) for name, version, hashed in found]
+    pins_ = [pin.match(line).groups() for line in lines if line.strip()]
+    return [(name.lower(), version, bool(hashed)) for name, version, hashed in pins_]
 
 
 def test_all_that_make_installs_is_locked_with_hashes():
@@ -90,11 +90,11 @@ def test_all_that_make_installs_is_locked_with_hashes():
     assert re.findall(r'pip install.*', script) == [
         'pip install -q --no-deps --require-hashes --no-build-isolation "$@" \\']
     locked = {file: pins(file) for file in (ROOT / 'wheels' / 'lock').glob('*.txt')}
-    assert all(found and all(hashed for *_, hashed in found) for found in locked.values())
+    assert all(pins_ and all(hashed for *_, hashed in pins_) for pins_ in locked.values())
     direct = [*(ROOT / 'wheels').glob('*.txt'), ROOT / 'docs' / 'requirements.txt',
               *(ROOT / 'benchmark').glob('*.txt')]
     assert {pin[:2] for file in direct for pin in pins(file)} <= {
-        pin[:2] for found in locked.values() for pin in found}
+        pin[:2] for pins_ in locked.values() for pin in pins_}
 
 
 def test_actions_are_pinned_by_commit():
@@ -192,11 +192,11 @@ def test_the_build_says_in_one_line_what_is_missing(copy, tmp_path, lines, setti
              'PIP_RETRIES': '1'}
     ended = subprocess.run(['make', 'build'], cwd=copy, env={**usual, **settings}, text=True,
                            capture_output=True, timeout=120)
-    said, = (line for line in ended.stderr.splitlines() if not line.startswith('make'))
-    assert ended.returncode and complaint in said
+    message, = (line for line in ended.stderr.splitlines() if not line.startswith('make'))
+    assert ended.returncode and complaint in message
 
 
-def test_clean_removes_nothing_that_git_keeps(kept):
+def test_clean_removes_nothing_that_git_keeps(tracked):
     rule = re.search(r'\trm -rf (.*?)\n\tfind', (ROOT / 'Makefile').read_text(), re.DOTALL)[1]
     removed = {made for pattern in re.findall(r'[\w.*/-]+', rule) for made in ROOT.glob(pattern)}
-    assert removed and not [file for file in kept if removed & {file, *file.parents}]
+    assert removed and not [file for file in tracked if removed & {file, *file.parents}]

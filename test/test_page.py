@@ -687,10 +687,10 @@ def labelled(page, body, count, width, height, high, slack=0.0):
         apart = np.maximum(abs(y[:, None] - y) / high,
                            2.0 * abs(x[:, None] - x) / (wide[:, None] + wide))
         assert apart[~np.eye(len(x), dtype=bool)].min(initial=1.0) > 1.0 - 1e-9
-        away = np.hypot(*(np.maximum(abs(at[:, None] - of) - half, 0.0) for at, of, half in zip(
+        gaps = np.hypot(*(np.maximum(abs(at[:, None] - of) - half, 0.0) for at, of, half in zip(
             (x, y), np.transpose(places), (0.5 * wide[:, None], 0.5 * high))))
-        own = away[np.arange(len(x)), number.astype(int)]
-        assert (own <= away.min(axis=1, initial=math.inf) + slack).all()
+        own = gaps[np.arange(len(x)), number.astype(int)]
+        assert (own <= gaps.min(axis=1, initial=math.inf) + slack).all()
         yield len(x)
 
 

@@ -28,9 +28,7 @@ yes No ON y N TRUE tRUE [] {} [1,2] [0,1.5] [1.5,0] [1.5,.5] [true,no] [1,true] 
 # What ROS reads in a surprising way, such as 010 as 8, and what it refuses, too.
 REFUSED = set(r"""
 010 08 00 nan inf Infinity -nan nan(1) 0x1p3 0X1.8P1 !!str !!float !custom {} [0,1.5] [1.5,0]
-[1,true] [a,1]
-[[1]] [[1],[2]] [1,2
-*x &x - | @x `x %x #
+[1,true] [a,1] [[1]] [[1],[2]] [1,2 *x &x - | @x `x %x #
 """.split()) | {
     '!!str 5', '!!float 5', '!custom 3', '- 5', '>\n      text',
     '|-\n      5', '|\n      5', '[{a: 1}]', '{[1]: 2}', '? 3',
@@ -79,8 +77,7 @@ def of_ros(path, name, expected):
         # An empty list has no type, and is declared only by name.
         node = Node(name, **arguments)
         dynamic = ParameterDescriptor(dynamic_typing=True)
-        parameters = {key: node.declare_parameter(key, None, dynamic)
-                      for key in expected}
+        parameters = {key: node.declare_parameter(key, None, dynamic) for key in expected}
     node.destroy_node()
     return {key: list(parameter.value) if hasattr(parameter.value, 'tolist') else parameter.value
             for key, parameter in parameters.items() if key not in OF_ROS}

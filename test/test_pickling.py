@@ -38,8 +38,7 @@ def answers(linkage):
     theta = several if len(several) > 1 else FIVE
     values = [*linkage.solve(theta).values(), *linkage.joint_angles(theta).values(),
               *linkage.joint_rates(theta).values(), *linkage.velocity(theta).values()]
-    if len(linkage.inputs) == 1 and not any(
-            map(np.ndim, linkage.dimensions.values())):
+    if len(linkage.inputs) == 1 and not any(map(np.ndim, linkage.dimensions.values())):
         values += [linkage.reach(), linkage.dead_points(), linkage.function()(0.4)]
     return b''.join(map(bits, values))
 
@@ -53,6 +52,13 @@ def test_a_copy_answers_the_same(name, way):
     assert other is not linkage and type(other) is type(linkage) and repr(other) == repr(linkage)
     assert (other.branches, other.tracer) == (linkage.branches, linkage.tracer)
     assert answers(other) == answers(linkage)
+
+
+@pytest.mark.parametrize('way', WAYS.values(), ids=WAYS)
+def test_answers_go_to_other_processes(way):
+    solutions = mechanisms.create('five_bar').inputs_for(('P.x', 'P.y'), (0.05, 0.15))
+    assert [(each.inputs, each.mode) for each in map(way, solutions)] == [
+        (each.inputs, each.mode) for each in solutions]
 
 
 @pytest.mark.parametrize('name', LINKAGES)

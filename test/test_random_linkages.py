@@ -57,8 +57,7 @@ OTHERS = {
         'O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'C crank Q 1 geared crank -0.5 0.3',
         'B dyad A C 2 2 left', 'D crank B 0.4 zero A geared crank 2 0.1', 'R ground 1 5',
         'E cylinder R B 2 left', 'S ground 8 3', 'T ground 9 5',
-        'F carriage S along T 0 4 geared cylinder 0.5 0.2'),
-}
+        'F carriage S along T 0 4 geared cylinder 0.5 0.2')}
 LISTED = {
     **{kind: random_linkages.Design(mechanisms.design(kind).joints, mechanisms.defaults(kind), {})
        for kind in mechanisms.TYPES},
@@ -68,13 +67,13 @@ LISTED = {
     **{name: random_linkages.Design(lines, {}, {}) for name, lines in OTHERS.items()}}
 
 
-def problems(seeds, asked):
+def problems(seeds, design_of):
     """Return what does not hold for random linkages, with the seed of each."""
     problems_ = []
     for seed in seeds:
         rng = np.random.default_rng(seed)
-        told = checks.problems(random_linkages.design(rng), rng, asked(seed))
-        problems_ += [(seed, *problem) for problem in (told[0] if told else ())]
+        found_ = checks.problems(random_linkages.design(rng), rng, design_of(seed))
+        problems_ += [(seed, *problem) for problem in (found_[0] if found_ else ())]
     return problems_
 
 
@@ -129,7 +128,7 @@ def test_the_catalogue_with_hard_dimensions_holds(kind, seed, count):
 
 
 # Linkages that broke the rule once, and where.
-AWAY = [side * 10.0 ** power for side in (-1.0, 1.0) for power in range(-15, 0, 2)]
+STEPS = [side * 10.0 ** power for side in (-1.0, 1.0) for power in range(-15, 0, 2)]
 MENDED = {
     **{f'a dyad past the change points of {bars}': ((
         'O ground 0 0', f'Q ground {ground} 0', 'A crank O 1', f'B dyad A Q {bars} {side}'),
@@ -140,19 +139,19 @@ MENDED = {
         (-9.0, -2.2, -2.0, 1.0, 1.1, 4.1, 4.3, 7.0)),
     'crossed bars next to the flat pose': ((
         'A ground 0 0', 'C ground 0 -0.4', 'D crank A 1.9', 'H antiparallelogram A D C'),
-        [0.5 * math.pi + away for away in AWAY]),
+        [0.5 * math.pi + step for step in STEPS]),
     'crossed bars of which one is short beside the crank': ((
         'A ground 0 0', 'B ground 0 0.158', 'C crank A 0.776', 'D antiparallelogram A B C'),
-        [0.5 * math.pi + away for away in AWAY]),
+        [0.5 * math.pi + step for step in STEPS]),
     'a kite on a ground line that is short beside the crank': ((
         'O ground 0 0', 'Q ground -0.072 0', 'A crank O 1.871 up', 'B mirror O Q A'),
         np.linspace(0.5, 0.7, 10)),
     'a cell of bars that differ by rounding': ((
         'O ground 0 0', 'P ground -1.2 0', 'A crank O 1.2', 'B C D inversor P A 0.5 0.5-1.7e-15'),
-        [math.pi + away for away in AWAY]),
+        [math.pi + step for step in STEPS]),
     'crossed bars on a cylinder': ((
         'A ground 0 0', 'C ground 0 -0.4', 'B cylinder C A 1.9 left', 'H antiparallelogram A B C'),
-        [2.3 + away for away in AWAY]),
+        [2.3 + step for step in STEPS]),
     'a block on a short bar of a kite': ((
         'A ground 0 0', 'B ground -0.098 0', 'C ground -0.295 0', 'D crank C 1.796 up',
         'E dyad D B 1.202 0.926 left', 'F mirror B C E', 'H slider D 0.7 F along C in'),
@@ -186,8 +185,7 @@ MENDED = {
         'F slider E 3.166 A along C out'), (-2.2665130987562727,)),
     'an image of a joint of the ground': ((
         'A ground 0 0', 'C ground 0.170347395 0', 'D ground 0.03191923 1.50131151692',
-        'E crank A 1', 'K image A D C'), (0.3,)),
-}
+        'E crank A 1', 'K image A D C'), (0.3,))}
 
 
 @pytest.mark.nightly(all_but=4)
@@ -227,16 +225,17 @@ def test_reach_and_dead_points_that_were_missed_once(joints, held):
 
 def test_the_measure_sees_a_flaw_in_the_last_digits_and_a_wrong_nan():
     subject = checks.Subject(random_linkages.Design(MOVING, {}, {}), np.random.default_rng(9))
-    given = np.array([[0.7, *subject.held]])
-    found = drawing_accuracy.answers(subject.mechanism, given, subject.poses, True)
+    theta = np.array([[0.7, *subject.held]])
+    results = drawing_accuracy.answers(subject.mechanism, theta, subject.poses, True)
     measure = subject.measure()
-    assert not drawing_accuracy.broken(drawing_accuracy.judge(measure, given, found, True))
-    truth = measure.at(given[0], True)
-    moving = [output for output in found if measure.due(output, truth.states) == 'number'
+    assert not drawing_accuracy.broken(drawing_accuracy.judge(measure, theta, results, True))
+    truth = measure.at(theta[0], True)
+    moving = [output for output in results if measure.due(output, truth.states) == 'number'
               and output.name not in (*subject.linkage.fixed, *(
                   input_.name for input_ in subject.mechanism.inputs))]
     assert len(moving) > 10
-    for output, value in ((output, found[output]) for output in moving):
+    for output, value in ((output, results[output]) for output in moving):
         for flawed in (value * (1.0 + 1e-12) + 1e-12, np.full_like(value, np.nan)):
-            rows = drawing_accuracy.judge(measure, given, {**found, output: flawed}, True, [truth])
+            wrong = {**results, output: flawed}
+            rows = drawing_accuracy.judge(measure, theta, wrong, True, [truth])
             assert {row.output for row in drawing_accuracy.broken(rows)} == {output}

@@ -13,7 +13,7 @@ from truth import drawing_accuracy, hard_cases, linkage_checks
 TURN = [(-math.pi, math.pi)]
 
 
-def told(mechanism, *more):
+def described(mechanism, *more):
     """Return what reproduces a failure."""
     return f'{mechanism.type} {mechanism.dimensions} {mechanism.branches} {more}'
 
@@ -28,7 +28,7 @@ def test_every_end_of_the_reach_is_a_limit_to_the_last_digits(kind, count):
         for end in (end for arc in mechanism.reach() if [arc] != TURN for end in arc):
             ends += 1
             states = measure.at([end]).states
-            assert {'grazes', 'slips'} & {*states.values()}, told(mechanism, end, states)
+            assert {'grazes', 'slips'} & {*states.values()}, described(mechanism, end, states)
     assert ends > 20
 
 
@@ -39,7 +39,7 @@ def test_a_joint_that_never_ends_the_reach_moves_no_end_of_it(kind):
         larger = mechanisms.create('custom', branches=mechanism.branches, joints=(
             *map(str, mechanism.design.joints), f'ZZ slider {mechanism.tracer} {rod!r} {ground} 0'
             ' out'), **mechanism.dimensions)
-        assert larger.reach() == mechanism.reach(), told(mechanism)
+        assert larger.reach() == mechanism.reach(), described(mechanism)
 
 
 @pytest.mark.parametrize('a, e', [(80.0, 0.0), (math.nextafter(80.0, 90.0), 0.0), (80.0, 1e-9)])

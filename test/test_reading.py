@@ -101,13 +101,13 @@ def test_a_sender_whose_first_number_is_none_is_learnt(reader):
 
 def held(owner):
     """Return how many objects an object holds, itself and by way of others."""
-    found, waiting = {}, [owner]
+    objects, waiting = {}, [owner]
     while waiting:
         one = waiting.pop()
-        if id(one) not in found and not isinstance(one, (type, FunctionType, ModuleType)):
-            found[id(one)] = one
+        if id(one) not in objects and not isinstance(one, (type, FunctionType, ModuleType)):
+            objects[id(one)] = one
             waiting.extend(gc.get_referents(one))
-    return len(found)
+    return len(objects)
 
 
 def test_what_is_remembered_is_bounded_whatever_comes(reader):
@@ -125,10 +125,10 @@ def test_what_is_remembered_is_bounded_whatever_comes(reader):
     assert after(range(message_layout.MAX_SENDERS, 1000)) <= full
 
 
-def outcome(said, *args):
+def outcome(errors, *args):
     """Return what some bytes say, as text in which what is no number equals itself, or 'bad'."""
     try:
-        return repr(said(*args))
+        return repr(errors(*args))
     except Unreadable:
         return 'bad'
 
@@ -172,8 +172,7 @@ SEEDS = {
     'short': message(['a']), 'two': message(['a_crank', 'b'], frame='world'),
     'efforts': message(['leg_crank'] * 3, effort=True), 'none': message([]),
     'no velocities': message(['ab', 'abc', 'abcd'], velocities=False),
-    'nameless': JointState(position=[1.0, 2.0]), 'names': JointState(name=['a', 'b', 'c']),
-}
+    'nameless': JointState(position=[1.0, 2.0]), 'names': JointState(name=['a', 'b', 'c'])}
 
 
 @pytest.mark.nightly(all_but=3)

@@ -73,9 +73,9 @@ def test_the_same_request_gives_the_same_bytes(tmp_path, ending, args):
 
 @pytest.mark.skipif(not shutil.which('ffmpeg'), reason='ffmpeg is not installed')
 def test_an_mp4_has_the_frames_asked_for_and_the_same_bytes_each_time(tmp_path):
-    asked = '--frames', '3', '--fps', '5', '--size', '320x240'
-    once = rendered(tmp_path, *asked, ending='mp4').read_bytes()
-    file = rendered(tmp_path, *asked, ending='mp4')
+    options = '--frames', '3', '--fps', '5', '--size', '320x240'
+    once = rendered(tmp_path, *options, ending='mp4').read_bytes()
+    file = rendered(tmp_path, *options, ending='mp4')
     assert file.read_bytes() == once and once[4:8] == b'ftyp'
     raw = subprocess.run(['ffmpeg', '-v', 'info', '-i', file, '-f', 'rawvideo', '-'],
                          capture_output=True, check=True)
@@ -439,8 +439,7 @@ def test_an_svg_has_every_part_in_its_order_where_it_was_solved(tmp_path, size, 
     (['jansen.yaml', '--out', 'a.png', '--show', 'lables'], 'did you mean labels?'),
     (['picture.png', '--out', 'a.png'], 'picture.png'),
     (['--mechanism', 'jansen', 'all.yaml', '--out', 'a.png'], ': SCENE, before any --mechanism'),
-    (['still.yaml', '--out', 'a.gif'], 'speed is 0, and its turns are what an animation shows'),
-])
+    (['still.yaml', '--out', 'a.gif'], 'speed is 0, and its turns are what an animation shows')])
 def test_what_cannot_be_is_said_in_one_line_and_no_file_is_left(
         args, said, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -86,18 +86,18 @@ def check_closed(robot, joints, loops):
 @pytest.mark.parametrize('file', FILES)
 def test_published_joints_close_the_loops_of_a_file(file, library):
     more, motors, loops = FILES[file]
-    found, path = imported(file, *more), str(ROBOTS / file)
+    mechanisms_, path = imported(file, *more), str(ROBOTS / file)
     read = readers.read(path, *more[1:])
     robot = MuJoCo((ROBOTS / file).read_text()) if file.endswith('.xml') else library(
         readers.description(path, read))
     for part in np.linspace(0.0, 1.0, 15):
         joints, at = {}, {motor: low + part * (high - low)
                           for motor, (low, high) in motors.items()}
-        for mechanism in found:
+        for mechanism in mechanisms_:
             joints.update(published(mechanism, **{
                 settings.source: at[settings.source] for settings in mechanism.inputs.values()}))
         check_closed(robot, joints, loops)
-    rest, lost = cli.others(read, {mechanism.name: mechanism for mechanism in found}, {})
+    rest, lost = cli.others(read, {mechanism.name: mechanism for mechanism in mechanisms_}, {})
     rest = scene.read({**rest, 'mechanisms': ['others']}).mechanisms if rest else {}
     assert not lost and {*robot.joints} <= joints.keys() | check.published(rest)
 
@@ -401,7 +401,7 @@ def test_a_jaw_slides_as_its_crank_and_rod_say(tmp_path, sign):
 def changed(text, rng):
     """Return a file with a byte, a number, a text or an element changed."""
     def spans(pattern):
-        return [found.span() for found in re.finditer(pattern, text, re.DOTALL)]
+        return [match.span() for match in re.finditer(pattern, text, re.DOTALL)]
 
     low, high = rng.choice(spans(rng.choice((
         '.', r'[-+]?\d+\.?\d*', r'(?<=")[^"]*(?=")', r' \w+="[^"]*"', r'<(\w+)[^<>]*/>',
@@ -452,12 +452,12 @@ def test_a_name_of_a_file_is_only_a_name_in_a_scene_and_in_a_terminal(tmp_path, 
                 part.set(key, called[part.get(key)])
     file = of_text(tmp_path / 'robot\nevil: 2\n#.urdf', ElementTree.tostring(root, 'unicode'))
     for args in ['--driven', 'nobody'], []:
-        found, out, err = printed(file, *args)
+        status, out, err = printed(file, *args)
         for line in err.splitlines():
             assert line.isprintable() and len(line) < 5000
             assert max(map(len, line.split()), default=0) <= 300
         assert all(line.isprintable() for line in out.splitlines())
-    assert found == code
+    assert status == code
     if not code:
         mechanism, = imported(file)
         assert yaml.safe_load(out).keys() == {'/**'}
@@ -578,10 +578,10 @@ def test_a_parallelogram_stays_one_on_universal_joints_and_in_any_pose(tmp_path,
         ['--pose', *(f'joint_{each}' for each in pose.split())] * bool(pose)))
     for angle in (-2.0, 0.4, 3.0):
         # Positions count from the file's zero, also that of the joint which closes the loop.
-        found = published(mechanism, joint_A=angle)
-        assert found.keys() == {f'joint_{name}' for name in 'ABCD'}
+        angles = published(mechanism, joint_A=angle)
+        assert angles.keys() == {f'joint_{name}' for name in 'ABCD'}
         for name, value in {'joint_B': -angle, 'joint_C': angle, 'joint_D': angle}.items():
-            assert math.remainder(found[name] - value, math.tau) == pytest.approx(0.0, abs=1e-14)
+            assert math.remainder(angles[name] - value, math.tau) == pytest.approx(0.0, abs=1e-14)
 
 
 # Of a hinge in the tree, and of one that closes a loop.
@@ -592,8 +592,7 @@ def test_a_parallelogram_stays_one_on_universal_joints_and_in_any_pose(tmp_path,
     (9e-4, 'from_robot: Warning: the file is not exact: axes lean by 0.0009 rad, and loops stay'),
     (5e-6, 'from_robot: Warning: the file is not exact: axes lean by 5e-06 rad, and loops stay'),
     (0.0, ''), (2e-3, 'are 0.115 degrees from it, more than 0.057; ')])
-def test_a_misfit_is_printed_and_imported_if_it_is_small(
-        tmp_path, lean, why, file, axis, start):
+def test_a_misfit_is_printed_and_imported_if_it_is_small(tmp_path, lean, why, file, axis, start):
     code, out, err = printed(written(tmp_path, file, (axis, axis.replace('"0 ', f'"{lean} '))))
     assert code == (lean > 1e-3) and why in err and bool(why) == ('rad, and' in err or code > 0)
     # Where the file has it, by as much as the axis leans.
@@ -650,11 +649,11 @@ def test_a_joint_of_the_whole_robot_that_opens_a_loop_is_named(monkeypatch):
                         'mechanisms': ['hip', 'others']}).mechanisms
     made = [check.Imported('hip', {}, [], ['hip', 'crank_motor'])]
     assert not check.compared(robot, mechanisms, made)[1]
-    found = check.compared(robot, wrong, made)
-    assert not found[0] and re.match('with hip at .*, crank_motor at .* its loops stand open by ',
-                                     found[1]['hip'])
-    monkeypatch.setattr(check, 'compared', lambda *_: found)
-    assert f'Left out: hip: compared with the robot: {found[1]["hip"]}.' in refused(
+    report = check.compared(robot, wrong, made)
+    assert not report[0] and re.match('with hip at .*, crank_motor at .* its loops stand open by ',
+                                      report[1]['hip'])
+    monkeypatch.setattr(check, 'compared', lambda *_: report)
+    assert f'Left out: hip: compared with the robot: {report[1]["hip"]}.' in refused(
         'wheel_leg.urdf', '--pose', 'hip=0')
 
 
@@ -745,27 +744,27 @@ def moves(linkage, values, robot, steps, lean=0.0, before_names=''):
     with something before them.
     """
     try:
-        parameters, said, _ = cli.described(robot)
+        parameters, reports, _ = cli.described(robot)
     except RequestError as error:
         assert re.search('closes a loop|not of dyads|it cannot move|lie in line|loops end',
                          str(error))
         assert cli.WRONG not in str(error)
         return False
     assert all(count >= 200 and worst < 1e-6 + 100.0 * lean
-               for count, worst in checked('\n'.join(said)))
+               for count, worst in checked('\n'.join(reports)))
     mechanisms = scene.read(parameters).mechanisms.values()
     before, starts, moved = linkage.joint_angles(values), robot.positions, False
     for step in steps:
         after = linkage.joint_angles(theta_of(np.ravel(values) + step))
         named = zip([before_names + each.name for each in linkage.inputs], step)
-        motors, found = {name: starts[name] + by for name, by in named}, {}
+        motors, positions = {name: starts[name] + by for name, by in named}, {}
         for mechanism in mechanisms:
-            found.update(published(mechanism, **{settings.source: motors[settings.source]
-                                                 for settings in mechanism.inputs.values()}))
+            positions.update(published(mechanism, **{settings.source: motors[settings.source]
+                                                     for settings in mechanism.inputs.values()}))
         for link in linkage.links:
             name = before_names + link.name
-            if name in found and name not in motors:
-                off = found[name] - starts[name] - (after[link.name] - before[link.name])
+            if name in positions and name not in motors:
+                off = positions[name] - starts[name] - (after[link.name] - before[link.name])
                 slides, moved = link.kind == 'prismatic', True
                 off = off / linkage.longest if slides else math.remainder(off, math.tau)
                 assert not abs(off) > 1e-9 + 100.0 * lean, (link.name, step)

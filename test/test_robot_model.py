@@ -175,21 +175,23 @@ def test_geared_joints_follow_as_they_are_published(name):
     # With the signs turned of all but one of the cranks.
     mechanism = scene.read({'mechanisms': ['m'], **parameters, 'm.joint_names': [
         f'{key}=-back_{key}' for key in mechanism.joints if key != 'crank2']}).mechanisms['m']
-    follows = model([mechanism]).follows
-    assert len(follows) == len(mechanism.linkage.geared) * len(mechanism.assembly().legs)
+    robot = model([mechanism])
+    # With mimics it is of a version that has them.
+    assert ElementTree.fromstring(sdf.write(robot)).get('version') == '1.11'
+    assert len(robot.follows) == len(mechanism.linkage.geared) * len(mechanism.assembly().legs)
     for thetas in np.random.default_rng(1).uniform(-3.0, 3.0, (4, len(mechanism.inputs))):
         positions, _ = joints_and_places(mechanism, thetas)
-        for geared, (driving, ratio, offset) in follows.items():
+        for geared, (driving, ratio, offset) in robot.follows.items():
             assert math.remainder(ratio * positions[driving] + offset - positions[geared], math.tau
                                   ) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_gazebo_has_a_plugin_for_each_cut_and_each_motor():
-    root, = ElementTree.fromstring(sdf.write(model([simulated('five_bar')])))
+    root, = file = ElementTree.fromstring(sdf.write(model([simulated('five_bar')])))
     plugins = [(plugin.get('filename'), plugin.get('name').rpartition('::')[2],
                 {part.tag: part.text for part in plugin}) for plugin in root.findall('plugin')]
     controller = ('gz-sim-joint-position-controller-system', 'JointPositionController')
-    assert root.get('name') == 'm' and plugins == [
+    assert (file.get('version'), root.get('name')) == ('1.7', 'm') and plugins == [
         ('gz-sim-detachable-joint-system', 'DetachableJoint', {
             'parent_link': 'm_AP_link', 'child_model': '__model__', 'child_link': 'm_P_cut'}),
         ('gz-sim-joint-state-publisher-system', 'JointStatePublisher', {}),

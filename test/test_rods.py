@@ -297,13 +297,13 @@ def test_accelerations_are_those_of_the_motion(g1):
     step, at, speed, change = 1e-4, (0.1, -0.05), (1.0, 2.0), (3.0, -1.0)
     inputs = [[x + v * t + 0.5 * a * t * t for x, v, a in zip(at, speed, change)]
               for t in (-step, 0.0, step)]
-    for values, found in (
+    for values, results in (
             ([pose(g1, each) for each in inputs],
              list(g1.joint_accelerations(at, speed, change, ['pitch', 'roll']).values())),
             ([g1.solve(each, ('R_roll',))['R_roll'] for each in inputs],
              g1.acceleration(at, speed, change, ('R_roll',))['R_roll'])):
         np.testing.assert_allclose(
-            found, (values[0] - 2.0 * values[1] + values[2]) / step ** 2, rtol=1e-5, atol=1e-6)
+            results, (values[0] - 2.0 * values[1] + values[2]) / step ** 2, rtol=1e-5, atol=1e-6)
 
 
 def test_the_reach_of_one_rod_ends_where_it_is_stretched():
@@ -345,8 +345,7 @@ def test_the_reach_of_one_rod_ends_where_it_is_stretched():
     ((*G1[:5], 'L bar left 0 0 0 roll 1 0 0'), 'expected NAME and one of the constructions hinge'),
     (('a hinge ground at 0 0 0 axis 0 0 1', 'm motor ground at 2 0 0 axis 0 0 1',
       'R rod m 3 0 0 a 1 0 0'), 'as drawn it is at a dead point of a'),
-    (('a hinge ground at 0 0 0 axis 0 0 1', 'R rod ground 3 0 0 a 1 1 0'), 'line that drives it'),
-])
+    (('a hinge ground at 0 0 0 axis 0 0 1', 'R rod ground 3 0 0 a 1 1 0'), 'line that drives it')])
 def test_what_cannot_be_solved_is_refused_in_words(lines, problem):
     with pytest.raises(ValueError, match=problem):
         made(lines)

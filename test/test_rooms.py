@@ -48,7 +48,7 @@ def imports(module):
     guarded = {each for node in nodes if isinstance(node, ast.With)
                and ast.unparse(node.items[0].context_expr).startswith('needs(')
                for each in ast.walk(node)}
-    here, found = ['linkage_ros', *module.relative_to(PACKAGE).parent.parts], {}
+    here, imports_ = ['linkage_ros', *module.relative_to(PACKAGE).parent.parts], {}
     for node in nodes:
         if isinstance(node, (ast.Import, ast.ImportFrom)):
             level = getattr(node, 'level', 0)
@@ -56,8 +56,8 @@ def imports(module):
                     *filter(None, [getattr(node, 'module', None)])]
             for alias in node.names:
                 name = '.'.join([*base, alias.name])
-                found[name] = node in guarded and found.get(name, True)
-    return found
+                imports_[name] = node in guarded and imports_.get(name, True)
+    return imports_
 
 
 def file_of(name):

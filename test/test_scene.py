@@ -8,6 +8,7 @@ import math
 import re
 from xml.etree import ElementTree
 
+from effort import few_calls
 from linkage_ros import mechanisms, scene
 from linkage_ros.robot_model import urdf
 from linkage_ros.scene import slider, writing
@@ -37,18 +38,18 @@ def test_without_parameters_the_scene_is_the_catalogue():
 
 def rewritten(before, folder):
     """Return the values with which a scene is written, and the scene that is read of them."""
-    kept, file = writing.without_defaults(before), folder / 'again.yaml'
-    file.write_text(writing.in_yaml(kept))
-    return kept, scene.load(str(file))
+    values, file = writing.without_defaults(before), folder / 'again.yaml'
+    file.write_text(writing.in_yaml(values))
+    return values, scene.load(str(file))
 
 
 @pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('file', EXAMPLES)
 def test_a_scene_is_written_as_the_few_values_that_tell_it(file, tmp_path):
     before = scene.load(str(file))
-    kept, again = rewritten(before, tmp_path)
+    values, again = rewritten(before, tmp_path)
     assert again.parameters == before.parameters
-    usual = [p.name for p in before.parameters if p.name in kept and p.value == p.default]
+    usual = [p.name for p in before.parameters if p.name in values and p.value == p.default]
     assert all('.dimensions.' in name or name.rpartition('.')[2] in ('mechanisms', 'type', 'scale')
                for name in usual)
 
@@ -153,8 +154,7 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     *[({**OWN, 'own.joints': [*joints, 'A crank O 1'], 'own.mirrored': True},
        'own.leg_pairs must be 1 and mirrored false: only')
       for joints in (['O ground 0 0', 'B crank O 1'], ['O ground 1 0'])],
-    ({'jansen.joints': ['O ground 0 0']}, 'jansen.joints is not a parameter'),
-])
+    ({'jansen.joints': ['O ground 0 0']}, 'jansen.joints is not a parameter')])
 def test_a_wrong_parameter_is_named_with_what_is_allowed(parameters, named):
     with pytest.raises(scene.SceneError, match='^' + named) as refused:
         scene.read(parameters)
@@ -169,6 +169,9 @@ def test_joints_bear_a_robots_own_names_signs_and_zeros():
                      'left0_BC': ('left-knee', -1.0, 0.0, True, False),
                      'right1_EF': ('ankle.2', -1.0, -0.15, True, True)}
     assert joints['left1_BC'].name == 'jansen_left1_BC' and len(joints) == 1 + 4 * 6
+    # A length is not wrapped.
+    piston = alone('slider_crank', joint_names=['block=-piston+9']).joints['block']
+    assert piston.of(3.5) == 5.5
 
 
 @pytest.mark.parametrize('name', [
@@ -180,13 +183,15 @@ def test_any_name_of_a_joint_can_be_quoted(name):
     assert joints['BC'] == (name, -1.0, 1.0, True, True)
 
 
-def test_only_mechanisms_that_are_given_something_else_are_read_again():
-    parameters = {'jansen.dimensions.m': 15.0, 'peaucellier.scale': 0.1}
-    before = scene.read(parameters)
-    after = scene.changed(
-        before, {'jansen.dimensions.m': 14.9, 'peaucellier.scale': 0.1}).mechanisms
-    assert {name for name in after if after[name] is not before.mechanisms[name]} == {'jansen'}
-    assert [p.name for p in scene.changed(before, {'rate': 9.0}).changed_from(before)] == ['rate']
+def test_of_a_thousand_mechanisms_only_one_that_changes_is_read_again():
+    names = [f'leg{i}' for i in range(1000)]
+    before = scene.read({'mechanisms': names, **{f'{name}.type': 'jansen' for name in names}})
+    values = {'leg7.dimensions.m': 14.9, 'leg8.scale': 1.0, 'rate': 9.0}
+    with few_calls(100_000):
+        after = scene.changed(before, values)
+    assert {name for name in names
+            if after.mechanisms[name] is not before.mechanisms[name]} == {'leg7'}
+    assert [p.name for p in after.changed_from(before)] == ['rate', 'leg7.dimensions.m']
 
 
 def test_a_crank_swings_in_the_arc_that_its_start_is_in():
@@ -248,6 +253,9 @@ def test_every_slider_has_its_value_between_finite_ends(parameters):
     *((name, {'crank.ratio': ratio}, approx(ends, abs=close)) for ratio in (-2.0, 1.0)
       for name, ends, close in (('crank.ratio', sorted((0.1 * ratio, 10.1 * ratio)), 0.2),
                                 ('crank.offset', (-math.pi, math.pi), 0.1))),
+    # A stroke of 8 m is about two turns.
+    ('cylinder.offset', {'joints': [*SIGNED['own.joints'], 'E cylinder Q O 8 left']},
+     approx((-4.0 * math.pi, 4.0 * math.pi))),
     # Grashof: with bars 1, r, 3 and a base of 4 the crank turns where r is from 2 to 6.
     ('dimensions.r', {'dimensions.r': 3.0}, approx((2.1, 5.9), abs=0.1)),
     # In this sweep a tenth of it will do.
@@ -274,8 +282,8 @@ def test_every_parameter_says_what_it_is_of_with_its_unit():
         field, (name, _, key) = each.field, each.name[4:].partition('.')
         assert field.meaning.endswith('.') and '{' not in field.meaning + field.unit
         if field.kind == 'double':
-            said = ''.join(re.findall(r'\[(.*?)\]', field.meaning))
-            assert field.unit == said.replace('1', ''), each.name
+            units = ''.join(re.findall(r'\[(.*?)\]', field.meaning))
+            assert field.unit == units.replace('1', ''), each.name
         if name in ('cylinder', 'tilt'):
             unit = {'cylinder': 'm', 'tilt': 'rad'}[name] + '/s' * (key == 'speed')
             assert name in field.meaning and field.unit in (unit, '')
@@ -328,8 +336,7 @@ def test_scenes_of_the_same_values_are_equal_however_they_are_written():
     ({'mechanisms': ['klann'], 'klann.crank.measures': 'crank.x'}, 'klann.crank.measures: '),
     ({'mechanisms': ['klann'], 'klann.crank.measures': 'distance(O,B)'}, 'does not move'),
     *[({'jansen.loads': ['BC=1'], **more}, 'jansen.loads must be empty for more than one leg')
-      for more in ({'jansen.leg_pairs': 2}, {'jansen.mirrored': True})],
-])
+      for more in ({'jansen.leg_pairs': 2}, {'jansen.mirrored': True})]])
 def test_settings_of_inputs_and_loads_that_cannot_be_are_refused(parameters, reason):
     base = ACTUATED if any(key.startswith('own') for key in parameters) else {}
     with pytest.raises(scene.SceneError) as refused:

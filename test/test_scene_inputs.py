@@ -50,8 +50,7 @@ CASES = {
         ('OB', 'H.y'), [(0.5, 0.6), (0.62, 0.45)]),
     'ankle': ('rods', {}, G1, {
         'scale': 1.0, 'right.ratio': -2.0, 'right.offset': 0.1, 'right.sweep': [-0.4, 0.4],
-        'loads': ['pitch=12', 'roll=-3']}, ('pitch', 'roll'), [(0.1, -0.05), (-0.2, 0.1)]),
-}
+        'loads': ['pitch=12', 'roll=-3']}, ('pitch', 'roll'), [(0.1, -0.05), (-0.2, 0.1)])}
 
 
 class Case:

@@ -23,11 +23,11 @@ def agree(linkage, outputs, values, expected, sure=1e-3):
     solutions, expected, worst = linkage.inputs_for(outputs, values), list(expected), 0.0
     assert len(solutions) == len(expected), (linkage, values, solutions, expected)
     for inputs, bends in expected:
-        gap, answer = min((max(input_.distance(x, y) / input_.size for input_, x, y in zip(
+        distance, answer = min((max(input_.distance(x, y) / input_.size for input_, x, y in zip(
             linkage.inputs, answer.inputs, inputs)), answer) for answer in solutions)
-        assert gap * answer.margin < 1e-12, (linkage, values, inputs, answer)
+        assert distance * answer.margin < 1e-12, (linkage, values, inputs, answer)
         assert answer.margin < sure or bends.items() <= answer.signs.items()
-        worst = max(worst, gap)
+        worst = max(worst, distance)
     return worst
 
 
@@ -74,11 +74,11 @@ def test_a_mode_is_followed_where_that_beyond_the_fold_is_nearer():
                                 c=0.7534721238980263, d=1.4852815970909945, f=1.514771842943107)
     inverse, near = linkage.inverse(('P.x', 'P.y')), (-0.7667284128232743, -0.7015517149803334)
     values = 2.040979962430155, -0.5094493998914134
-    nearer, kept = inverse.all(values, near)[:2]
-    assert (nearer.mode, kept.mode) == ('AP+ CP- det-', 'AP+ CP+ det+')
+    nearer, expected = inverse.all(values, near)[:2]
+    assert (nearer.mode, expected.mode) == ('AP+ CP- det-', 'AP+ CP+ det+')
     with few_calls(3000):
         inputs, _ = inverse.follow(values, near)
-    assert inputs == pytest.approx(kept.inputs, abs=1e-9)
+    assert inputs == pytest.approx(expected.inputs, abs=1e-9)
 
 
 def test_next_to_a_fold_both_searched_solutions_are_found_and_at_it_one():
@@ -143,9 +143,7 @@ def test_an_input_that_is_held_is_held_in_its_own_turn(hung, seed):
     (({}, 'P.x'), [0.1, 0.1], 'five_bar has no output {}; allowed: '),
     (('P.x', 'P.x'), [0.1, 0.1], 'outputs must differ, got P.x, P.x'),
     (('A.x', 'crank'), [0.1, 0.1], 'inputs: too few of them move A.x, crank'),
-    (('P.x', 'O.x'), [0.1, 0.1], 'P.x, O.x do not determine all inputs: too few of them move O.x'),
-    (('P.x', 'P.y'), [0.1], r'values must be as many numbers, got \[0.1\]'),
-    (('P.x', 'P.y'), 'ab', "values must be a number or an array of numbers, got 'ab'")])
+    (('P.x', 'O.x'), [0.1, 0.1], 'P.x, O.x do not determine all inputs: too few of them move O.')])
 def test_what_cannot_be_asked_is_refused_with_the_reason(outputs, values, reason):
     linkage = mechanisms.create('five_bar')
     for call in (linkage.inputs_for, lambda names, given: linkage.inverse(
@@ -177,6 +175,11 @@ def test_answers_lie_in_the_sweeps_or_the_reason_says_so():
     assert request.reason(0.05, 0.15) == (
         'P.x, P.y at 0.05, 0.15 needs the crank at 1.74732 rad, crank2 at 1.58104 rad, outside '
         'crank.sweep [3, 3.5]')
+    # The nearest comes first: a length counts in parts of its stroke, 91 m.
+    boom = alone(['O ground 0 0', 'Q ground 40 0', 'A crank O 1', 'B cylinder Q A 50 left'])
+    values = boom.linkage.function((), ('B.x', 'A.x'))(0.9, 48.0)
+    cranks = [x[0] for x, _ in InverseRequest(boom, ('B.x', 'A.x')).answers(values, (-0.3, 48.0))]
+    assert cranks == pytest.approx([-0.9, 0.9])
 
 
 def test_an_output_that_stands_still_in_most_poses_is_answered_where_it_moves():

@@ -26,8 +26,7 @@ MECHANISMS = {
     'guide on a coupler': lambda: alone(MOVING, crank__sweep=[0.8, 1.6], scale=3.0),
     'rack and its image': lambda: alone(RACK),
     'slotted_lever': lambda: alone('slotted_lever', dimensions__e=20.0, scale=1e-3),
-    'slider_crank': lambda: alone('slider_crank'),
-}
+    'slider_crank': lambda: alone('slider_crank')}
 
 
 def poses(mechanism, count=40):

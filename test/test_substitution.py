@@ -115,8 +115,7 @@ def faults(robot, seed):
                     robot, mechanism, values, made)
 
 
-@pytest.mark.parametrize('seeds', [
-    [7], pytest.param(range(100), marks=pytest.mark.nightly)])
+@pytest.mark.parametrize('seeds', [[7], pytest.param(range(100), marks=pytest.mark.nightly)])
 def test_every_fault_of_a_scene_is_found(seeds):
     tried = [fault for seed in seeds for fault in faults(planar(seed), seed)]
     assert not [fault for fault, found in tried if not found]

@@ -124,7 +124,8 @@ def test_what_is_not_assembled_is_out_of_reach_whatever_is_commanded(tmp_path):
     assert own[0] < low - 0.1 and own[-1] > high + 0.1
 
 
-READING = mechanisms.create('custom', joints=LIFT).joint_angles(0.5)['QB'] - 0.1
+READING, TOP = mechanisms.create('custom', joints=LIFT).joint_angles(
+    [0.5, -2.5])['QB'] - (0.1, 0.0)
 CHOICES = [
     # A geared joint counts turns both ways, and so does an encoder on it.
     (GEARED, {}, [], 1, [(value, -0.5 * value) for value in (1.0, -6.4, -7.0, -20.0)]),
@@ -136,8 +137,10 @@ CHOICES = [
     ([*GEARED[:3], 'D crank Q 0.27 geared crank -2 -1.4', GEARED[4]], {}, [], 1,
      [(-2.0 * crank - 1.4, crank) for crank in (0.4, -6.4)]),
     # What does not count turns is within one with its offset.
-    *((LIFT, {'joint_names': [f'QB={sign}3.0']}, ['wheel'], 0,
-       [(0.5, side * math.remainder(READING + 3.1, math.tau))])
+    (LIFT, {'joint_names': ['QB=wheel+3.0']}, ['wheel'], 0,
+     [(0.5, math.remainder(READING + 3.1, math.tau))]),
+    # If it passes half a turn, it goes on there.
+    *((LIFT, {'joint_names': [f'QB={sign}0.8']}, ['wheel'], 0, [(-2.5, side * (TOP + 0.8))])
       for sign, side in (('wheel+', 1.0), ('-wheel-', -1.0))),
     # A sensor repeats after a turn of what it measures; a geared one counts turns.
     *((LIFT, {'crank.measures': 'QB', 'crank.ratio': ratio, 'crank.offset': 0.1,
@@ -297,10 +300,10 @@ def test_a_singular_pose_is_said(library, mechanisms):
     assert boom.send(1, own, [1.0], [1e308])[0] == 2
 
 
-@pytest.mark.parametrize('side, position, said', [(1, math.nan, 4), (1, 4.0, 5), (0, 1e9, 5)])
-def test_before_a_position_is_known_none_is_written(library, mechanisms, side, position, said):
+@pytest.mark.parametrize('side, position, code', [(1, math.nan, 4), (1, 4.0, 5), (0, 1e9, 5)])
+def test_before_a_position_is_known_none_is_written(library, mechanisms, side, position, code):
     status, values = Memory(library, mechanisms['boom']).send(side, [position], [1.0], [1.0])
-    assert status == said and (values[:3 if side else 1] == UNWRITTEN).all()
+    assert status == code and (values[:3 if side else 1] == UNWRITTEN).all()
 
 
 @pytest.mark.nightly(all_but=5)
@@ -354,12 +357,12 @@ def test_the_joints_are_chosen_by_their_names(mechanisms):
 
 @pytest.mark.skipif(not shutil.which('avr-gcc'), reason='avr-gcc is not installed')
 def test_where_a_double_is_a_float_it_says_so(mechanisms, tmp_path):
-    for single, said in ((False, 'print the header again with --float'), (True, '')):
+    for single, reason in ((False, 'print the header again with --float'), (True, '')):
         file = tmp_path / 'lever.c'
         file.write_text(header.written(mechanisms['lever'], (), single) + 'int main(void) { }\n')
         ended = subprocess.run(['avr-gcc', '-mmcu=atmega328p', '-std=c99', '-c', file, '-o',
                                 tmp_path / 'lever.o'], capture_output=True, text=True)
-        assert (ended.returncode != 0) == bool(said) and said in ended.stderr
+        assert (ended.returncode != 0) == bool(reason) and reason in ended.stderr
 
 
 def written(folder, path, *arguments):
@@ -429,14 +432,14 @@ def test_a_package_names_what_the_scene_names(mechanisms):
         (f'robot_1/{name}', f'robot_1_plugins::{name}_loader') for name in AXES]
 
 
-@pytest.mark.parametrize('arguments, said', [
+@pytest.mark.parametrize('arguments, reason', [
     *((['--out', '{0}/' + name], f"single underscores, a letter first, not '{name}'")
       for name in ('My-Package', 'a', '1a', 'a__b', 'a_', 'a' * 65)),
     *((['--out', folder], 'or one written by this command, but') for folder in ('{0}', '{0}/cpp')),
     ([], 'one of the arguments --out --limits is required'),
     (['--out', '{0}/legs', '--joints', 'elbow'], "no mechanism has a joint 'elbow'"),
     (['--out', '{0}/legs', '--joints', 'kneee'], 'did you mean knee?')])
-def test_what_cannot_be_written_is_one_sentence(tmp_path, capsys, arguments, said):
+def test_what_cannot_be_written_is_one_sentence(tmp_path, capsys, arguments, reason):
     folder = tmp_path / 'mine'
     (folder / 'cpp').mkdir(parents=True)
     (folder / 'cpp' / 'CMakeLists.txt').touch()
@@ -445,7 +448,7 @@ def test_what_cannot_be_written_is_one_sentence(tmp_path, capsys, arguments, sai
     assert transmission.main([str(ROOT / 'examples' / 'leg.yaml'),
                               *(text.format(folder) for text in arguments)]) == 1
     printed = capsys.readouterr().err
-    assert printed.startswith('transmission: ') and printed.count('\n') == 1 and said in printed
+    assert printed.startswith('transmission: ') and printed.count('\n') == 1 and reason in printed
     assert (folder / 'notes.txt').read_text() == 'keep'
 
 

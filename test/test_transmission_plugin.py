@@ -156,10 +156,10 @@ UNREACHABLE = {'knee': 9.0, 'lever': 1.5, 'leg': [1.9, -0.2], 'lift': 0.5 + math
 def test_an_effort_that_would_be_infinite_is_zero(plugins):
     mechanism, component = plugins.mechanisms['lift'], plugins.component('lift')
     (_, dead), *_ = mechanism.linkage.extremes('QB')[0]
-    for crank, told in ((0.5, OK), (dead, SINGULAR)):
+    for crank, status_ in ((0.5, OK), (dead, SINGULAR)):
         component.read(poses(mechanism, crank)[0])
         status, (*_, effort) = component.write(effort=5.0)
-        assert status & SINGULAR == told and (effort == 0.0) == bool(told)
+        assert status & SINGULAR == status_ and (effort == 0.0) == bool(status_)
 
 
 def test_inputs_are_nearest_to_the_newest_position_and_efforts_at_the_measured_one(plugins):
@@ -244,15 +244,15 @@ def test_any_history_of_values_moves_a_motor_to_what_was_commanded(plugins, name
 def test_a_singular_pose_of_positions_alone_is_not_told(plugins):
     mechanism = plugins.mechanisms['rocker']
     dead = mechanism.linkage.extremes('QB')[0][0][1]
-    for kinds, told in ((('position',), OK), (KINDS, SINGULAR)):
+    for kinds, status_ in ((('position',), OK), (KINDS, SINGULAR)):
         component = plugins.component('rocker', kinds=kinds)
-        assert component.read(poses(mechanism, dead)[0])[0] == told
+        assert component.read(poses(mechanism, dead)[0])[0] == status_
 
 
 JOINT, MOTOR = 'joint_handle\tknee_QB', 'actuator_handle\tknee_motor'
 
 
-@pytest.mark.parametrize('name, lines, given, said', [
+@pytest.mark.parametrize('name, lines, given, reason', [
     # Roles are the names of the linkage; without one, the scene's name counts.
     ('knee', [], {'actuators': {'left_motor': 'crank'}, 'joints': {'left_knee': 'QB'}}, ''),
     ('knee', [], {'actuators': {'knee_motor': ''}, 'joints': {'knee_QB': ''}}, ''),
@@ -280,8 +280,8 @@ JOINT, MOTOR = 'joint_handle\tknee_QB', 'actuator_handle\tknee_motor'
        "joint 'knee_QB' needs a finite offset")
       for numbers in ('0\t0', 'nan\t0', 'inf\t0', '1\tnan')),
     ('lever', ['parameter\ta\t90'], {}, 'it has no parameters: write the package again')])
-def test_axes_and_handles_are_checked(plugins, name, lines, given, said):
-    with pytest.raises(Refused, match=re.escape(said)) if said else nullcontext():
+def test_axes_and_handles_are_checked(plugins, name, lines, given, reason):
+    with pytest.raises(Refused, match=re.escape(reason)) if reason else nullcontext():
         plugins.component(name, *lines, **{'kinds': ('position', 'effort'), **given})
 
 

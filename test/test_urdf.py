@@ -50,8 +50,7 @@ MECHANISMS = {
     'boom and arm': lambda: tilted(ON_BOOM, scale=2.0),
     'five-bar with a gear': lambda: tilted(
         GEARED, scale=1.0, crank2__sweep=[-6.0, 1.0],
-        joint_names=['crank2=-m_crank2+1.0', 'crank3=-m_crank3-0.4']),
-}
+        joint_names=['crank2=-m_crank2+1.0', 'crank3=-m_crank3-0.4'])}
 FROM_CASES = {name: lambda case=case, pairs=2 if name == 'Cardan gears' else 1: tilted(
     case.joints, leg_pairs=pairs,
     **{f'dimensions__{key}': value for key, value in case.dimensions.items()})

@@ -241,9 +241,9 @@ def test_a_node_that_does_not_answer_is_named(graph, show, monkeypatch):
     monkeypatch.setattr(scene_view, 'MAX_ANSWER_S', 0.1)
     graph.executor.remove_node(running.nodes[NODES.index(Kinematics)])
     # What the executor waits for already is answered once more.
-    said = '/kinematics/set_parameters_atomically does not answer'
-    until(lambda: page.set('/leg', scale=2.0) == said)
-    assert page.set('/leg', scale=3.0) == said and running.value('leg.scale') < 3.0
+    reason = '/kinematics/set_parameters_atomically does not answer'
+    until(lambda: page.set('/leg', scale=2.0) == reason)
+    assert page.set('/leg', scale=3.0) == reason and running.value('leg.scale') < 3.0
 
 
 def test_a_browser_that_has_not_drawn_is_sent_no_more(show):

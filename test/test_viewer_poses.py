@@ -272,17 +272,17 @@ def test_no_pose_of_a_fine_scale_is_nearer_by_more_than_the_leash(type_, joint, 
     rng = np.random.default_rng(16)
     for place in path.mean(axis=0) + rng.normal(size=(40, 2)) * width:
         theta, = nearest_inputs(linkage, joint, place, [arcs[0][0]], [arcs])
-        away = np.hypot(*(linkage.solve(float(theta), (joint,))[joint] - place))
+        distances = np.hypot(*(linkage.solve(float(theta), (joint,))[joint] - place))
         assert any(low <= theta <= high for low, high in arcs)
-        assert away <= np.hypot(*(path - place).T).min() + 0.1 * width
+        assert distances <= np.hypot(*(path - place).T).min() + 0.1 * width
 
 
 def test_a_rocker_that_is_dragged_stays_at_the_angle_of_its_crank_of_two_that_it_has():
     bar = mechanisms.create('four_bar')
     for crank in np.linspace(-3.0, 3.0, 13):
         place = bar.solve(crank + 0.03, ('B',))['B']
-        found, = nearest_inputs(bar, 'B', place, [crank], [[(-math.pi, math.pi)]])
-        assert abs(found - crank) < 0.1
+        crank_, = nearest_inputs(bar, 'B', place, [crank], [[(-math.pi, math.pi)]])
+        assert abs(crank_ - crank) < 0.1
 
 
 def test_what_cannot_be_assembled_is_not_dragged():

@@ -71,8 +71,7 @@ REQUESTS = [
     ('curve', '"kind": "transmission angle", "output": "L.x"', 'lever'),
     ('curve', '"colour": 1', 'the request fails'), ('export', '"a": 1', 'the request fails'),
     (50000 * 'x', '"a": 1', "unknown request 'x*[.]{3}x*'$"),
-    ('pose', '"arrows": "torque"', "^the request fails: KeyError.'torque'"),
-]
+    ('pose', '"arrows": "torque"', "^the request fails: KeyError.'torque'")]
 
 
 def test_a_request_is_answered_whatever_it_holds(lever, page):
@@ -134,8 +133,7 @@ FLOODS = {
     'settings': lambda page: page.send_str(
         '{"op": "set", "key": "/leg", "values": {"crank.speed": 1}, "id": 1}'),
     'pings': ping,
-    'drawn': lambda page: page.send_str('"drawn"'),
-}
+    'drawn': lambda page: page.send_str('"drawn"')}
 
 
 @pytest.mark.nightly
@@ -161,8 +159,7 @@ def test_a_client_that_does_not_read_costs_little_and_harms_nobody(show, what):
 @pytest.mark.nightly
 def test_requests_on_one_connection_whose_answers_nobody_reads_are_few(lever):
     host, port = urlsplit(lever.url).netloc.split(':')
-    with socket.create_connection((host, int(port))) as other, pytest.raises(
-            ConnectionError):
+    with socket.create_connection((host, int(port))) as other, pytest.raises(ConnectionError):
         other.settimeout(browser.DEADLINE)
         for _ in range(10_000):
             other.sendall(100 * f'GET /panel.js HTTP/1.1\r\nHost: {host}:{port}\r\n\r\n'.encode())

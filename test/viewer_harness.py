@@ -38,7 +38,7 @@ LEG = {**RATE, 'mechanisms': ['leg'], 'leg.type': 'jansen', 'leg.crank.speed': 0
 CLOSED = aiohttp.WSMsgType.CLOSE, aiohttp.WSMsgType.CLOSING, aiohttp.WSMsgType.CLOSED
 
 needs_browser = pytest.mark.skipif(
-    not browser.found(), reason=f'none of {", ".join(browser.NAMES)} is installed')
+    not browser.executable(), reason=f'none of {", ".join(browser.NAMES)} is installed')
 
 
 class Show(contextlib.ExitStack):

@@ -126,5 +126,4 @@ CASES = {
         O ground 0 0
         A crank O a
         B crank A b zero O""",
-        {'a': 0.4, 'b': 0.3}),
-}
+        {'a': 0.4, 'b': 0.3})}

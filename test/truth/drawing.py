@@ -560,8 +560,7 @@ def _corner_of(do, p, radius_p, q, radius_q, side):
 # The words for a point of a link, and where on the drawing of the link its numbers put it.
 LAID = {
     'rigid': lambda p, q, row, side: meet(DIGITS, p, row[0], q, row[1], side)[0],
-    'line': lambda p, q, row, _: p + (q - p) / abs(q - p) * row[0],
-}
+    'line': lambda p, q, row, _: p + (q - p) / abs(q - p) * row[0]}
 
 
 def draw(do, linkage, rows, values, way=None, turns=None, moved=None):

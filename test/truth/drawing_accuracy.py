@@ -204,14 +204,14 @@ class Measure:
         ways, longest = self._ways(True, None), max(
             number[0] for line, number in zip(self.linkage.lines, self.linkage.numbers)
             if line.word == 'crank')
-        found = [mpfr(1) if out.what == 'angle' else longest for out in self.poses]
+        tops = [mpfr(1) if out.what == 'angle' else longest for out in self.poses]
         for theta in np.arange(24) * (math.tau / 24) + 0.1:
             given = [mpfr(float(theta))]
             now = self._drawn(self._nominal, given)
             if all(gap > 0 for gap in now.gaps.values()):
                 speeds = self._values(now, _Move(self._nominal, given, ways))[len(self.poses):]
-                found = [max(top, abs(speed)) for top, speed in zip(found, speeds)]
-        return {out: float(top) for out, top in zip(self.poses, found)}
+                tops = [max(top, abs(speed)) for top, speed in zip(tops, speeds)]
+        return {out: float(top) for out, top in zip(self.poses, tops)}
 
     def rule(self, out):
         """Return an output's rule, the ulps beside it, and the error that is allowed at all."""
@@ -227,16 +227,16 @@ class Measure:
         """Return the linkage with each of its numbers moved to one side."""
         if side not in self._moved:
             linkage = self.linkage
-            found = [linkage.values({name: side * half_ulp(number)})
-                     for name, number in linkage.dimensions.items() if number]
-            found += [linkage.values(literal={text: side * half_ulp(float(text))})
-                      for text in linkage.literals()]
+            linkages = [linkage.values({name: side * half_ulp(number)})
+                        for name, number in linkage.dimensions.items() if number]
+            linkages += [linkage.values(literal={text: side * half_ulp(float(text))})
+                         for text in linkage.literals()]
             passed = [(i, 0, passing.gap) for i, passing in self._way.items() if passing.gap]
             for i, k, slack in [*linkage.roundings(), *passed]:
                 numbers = list(linkage.numbers)
                 numbers[i] = (*numbers[i][:k], numbers[i][k] + side * slack, *numbers[i][k + 1:])
-                found.append(numbers)
-            self._moved[side] = [self._given(numbers) for numbers in found]
+                linkages.append(numbers)
+            self._moved[side] = [self._given(numbers) for numbers in linkages]
         return self._moved[side]
 
     @precisely
@@ -292,11 +292,11 @@ class Measure:
     def _ways(self, rates, motion):
         """Return the ways through a pose along which it is differentiated."""
         still = (0,) * len(self._units)
-        found = [_Way(Motion((*still[:i], unit, *still[i + 1:]), still), 1, unit)
-                 for i, unit in enumerate(self._units if rates else ())]
+        ways = [_Way(Motion((*still[:i], unit, *still[i + 1:]), still), 1, unit)
+                for i, unit in enumerate(self._units if rates else ())]
         if motion:
-            found.append(_Way(Motion(*(tuple(map(mpfr, row)) for row in motion)), 2))
-        return tuple(found)
+            ways.append(_Way(Motion(*(tuple(map(mpfr, row)) for row in motion)), 2))
+        return tuple(ways)
 
     def _undirected(self, drawn):
         """Return the joints that are hung on an arm of no length."""

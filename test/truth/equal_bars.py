@@ -19,8 +19,7 @@ from .linkage_checks import checked, spots
 SIDE, EQUAL, NONE = mpfr(2) ** -150, mpfr(2) ** -50, mpfr(2) ** -280
 # What special values are asked with, and the largest error of a limit: of an angle [rad], or in
 # longest bars.
-STEPS = [0.0, *(sign * step for step in (1e-3, 1e-12, 1e-160, 1e-200, 5e-324)
-                for sign in (1, -1))]
+STEPS = [0.0, *(sign * step for step in (1e-3, 1e-12, 1e-160, 1e-200, 5e-324) for sign in (1, -1))]
 CLOSE = 1e-9
 
 

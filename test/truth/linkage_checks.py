@@ -144,10 +144,10 @@ class Subject:
 
     def reachable(self, drawing):
         """Tell for every sample whether all closures are met."""
-        held = np.ones(self.values.shape, bool)
+        assembled_ = np.ones(self.values.shape, bool)
         for gap in drawing.gaps.values():
-            held &= gap * np.ones(self.values.shape) >= 0.0
-        return held
+            assembled_ &= gap * np.ones(self.values.shape) >= 0.0
+        return assembled_
 
 
 def assembled(seeds):
@@ -166,8 +166,8 @@ def checked(check):
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter('error', RuntimeWarning)
-                return [Problem(found, f'{text}: {subject}')
-                        for found, text in check(subject, *args)]
+                return [Problem(kind, f'{text}: {subject}')
+                        for kind, text in check(subject, *args)]
         except Exception as error:  # noqa: B902
             return [Problem(f'{check.__name__}: {type(error).__name__}',
                             f'{str(error)[:200]}: {subject}')]
@@ -178,13 +178,13 @@ def checked(check):
 
 def spots(subject):
     """Return dead points and reach ends, as far as they can be had."""
-    found = []
+    values = []
     for method in (subject.mechanism.reach, subject.mechanism.dead_points):
         try:
-            found += np.ravel(method(*subject.held)).tolist()
+            values += np.ravel(method(*subject.held)).tolist()
         except Exception:  # noqa: B902
             continue  # `reach` and `dead_points` have a check of their own
-    return found
+    return values
 
 
 def asked(subject, count):
@@ -282,16 +282,16 @@ def _given(given, shape):
 
 
 def _all(mechanism, given):
-    found = {}
+    results = {}
     for method in ('solve', 'joint_angles', 'transmission_angles'):
         answers = getattr(mechanism, method)(given)
-        found.update((f'{method} {name}', np.asarray(value)) for name, value in answers.items())
+        results.update((f'{method} {name}', np.asarray(value)) for name, value in answers.items())
     for by in range(len(mechanism.inputs)):
         for method in ('velocity', 'joint_rates'):
             answers = getattr(mechanism, method)(given, by=by)
-            found.update((f'{method} {name} {by}', np.asarray(value))
-                         for name, value in answers.items())
-    return found
+            results.update((f'{method} {name} {by}', np.asarray(value))
+                           for name, value in answers.items())
+    return results
 
 
 def _same(name, one, other):
@@ -300,10 +300,10 @@ def _same(name, one, other):
     if one.shape != other.shape:
         return False
     with np.errstate(invalid='ignore'):
-        away = np.abs(one - other)
+        difference = np.abs(one - other)
     arctangent = name.startswith(('joint_angles', 'transmission'))
     ulp = 2.0 * np.spacing(np.abs(other)) if arctangent else 0.0
-    return bool(np.all((one == other) | (np.isnan(one) & np.isnan(other)) | (away <= ulp)))
+    return bool(np.all((one == other) | (np.isnan(one) & np.isnan(other)) | (difference <= ulp)))
 
 
 # --- reach and dead points ----------------------------------------------------------------------
@@ -313,13 +313,13 @@ def reach(subject):
     """Compare the reach with brute force; its ends and what lies on it must have a pose."""
     arcs = subject.mechanism.reach(*subject.held)
     drawing, _ = subject.drawn(subject.values)
-    held = subject.reachable(drawing)
+    assembled_ = subject.reachable(drawing)
     is_in = inside(arcs, subject.values, subject.inputs[0].turn if subject.periodic else 0.0)
-    wrong = np.flatnonzero(held != is_in)
+    wrong = np.flatnonzero(assembled_ != is_in)
     for i in wrong[::len(wrong) // 4 + 1]:
         value = float(subject.values[i])
         states = subject.states(value)
-        if held[i] and states <= {'meets', 'undirected'}:
+        if assembled_[i] and states <= {'meets', 'undirected'}:
             yield 'reach misses', f'{value!r} can be assembled, reach {arcs}'
         if is_in[i] and 'fails' in states and 'slips' not in states:
             yield 'reach too far', f'{value!r} cannot be assembled, reach {arcs}'
@@ -339,11 +339,11 @@ def reach(subject):
 
 def inside(arcs, values, turn):
     """Tell which values of an input lie on arcs, whole turns aside if there are any."""
-    held = np.zeros(np.shape(values), bool)
+    inside_ = np.zeros(np.shape(values), bool)
     for lo, hi in arcs:
-        away = np.mod(values - lo, turn) if turn else values - lo
-        held |= (away >= 0.0) & (away <= hi - lo)
-    return held
+        ahead = np.mod(values - lo, turn) if turn else values - lo
+        inside_ |= (ahead >= 0.0) & (ahead <= hi - lo)
+    return inside_
 
 
 @checked
@@ -365,10 +365,10 @@ def dead_points(subject):
                 and not subject.without_direction(value):
             yield 'dead point missed', f'{value!r} is not in {dead}'
     values = subject.values[::400]
-    away = mechanism.distance_to_dead_point(values, *subject.held)
+    distance = mechanism.distance_to_dead_point(values, *subject.held)
     true = [subject.away(value, dead) for value in values]
-    if not np.allclose(away, true, atol=1e-9 * subject.scale):
-        yield 'distance to dead point', f'{away} is not {true}'
+    if not np.allclose(distance, true, atol=1e-9 * subject.scale):
+        yield 'distance to dead point', f'{distance} is not {true}'
 
 
 def _closures(drawing, size):
@@ -387,8 +387,8 @@ def _is_dead(subject, value):
 def _vanishing(subject):
     """Return the values on the reach where a closure changes its sign or touches zero."""
     drawing, _ = subject.drawn(subject.values)
-    held, values = subject.reachable(drawing), subject.values
-    found = []
+    assembled_, values = subject.reachable(drawing), subject.values
+    zeros = []
     for k, row in enumerate(_closures(drawing, values.shape)):
         # What is zero all along, but for lengths that are nearly equal, tells no place.
         if not np.all(np.isfinite(row)) or np.median(np.abs(row)) < 1e-8:
@@ -396,16 +396,16 @@ def _vanishing(subject):
         # The signs of rounding, where lengths are equal but for 1e-12, tell no place either.
         sure = np.abs(row) > 1e-12
         changes = np.flatnonzero(((row[:-1] < 0.0) != (row[1:] < 0.0)) & sure[:-1] & sure[1:])
-        for i in changes[held[changes] | held[changes + 1]][:20]:
-            found.append(_crossing(subject, k, values[i], values[i + 1]))
+        for i in changes[assembled_[changes] | assembled_[changes + 1]][:20]:
+            zeros.append(_crossing(subject, k, values[i], values[i + 1]))
         if k >= len(drawing.gaps):
             continue  # a fold that only touches zero is no more than a doubt
         inner = np.abs(row[1:-1])
         dips = np.flatnonzero((inner <= np.abs(row[:-2])) & (inner <= np.abs(row[2:]))
-                              & (inner < 1e-4) & held[1:-1]) + 1
+                              & (inner < 1e-4) & assembled_[1:-1]) + 1
         for i in dips[:20]:
-            found.append(_touching(subject, k, values[i - 1], values[i + 1]))
-    return [each for each in found if each is not None and _on_reach(subject, each)]
+            zeros.append(_touching(subject, k, values[i - 1], values[i + 1]))
+    return [each for each in zeros if each is not None and _on_reach(subject, each)]
 
 
 def _closure(subject, k, values):
@@ -461,8 +461,8 @@ def moved(mechanism):
 def inverse(subject, count=2):
     """Ask which values of the first input give values that outputs have; `inverse_judge` tells."""
     for output in map(str, subject.rng.permutation(moved(subject.mechanism))[:count]):
-        found, _ = inverse_judge.judge(subject.mechanism, output, subject.rng, 4, subject.held)
-        for kind, what, *case in found:
+        counter, _ = inverse_judge.judge(subject.mechanism, output, subject.rng, 4, subject.held)
+        for kind, what, *case in counter:
             if (kind, what) in (('ordinary', 'lost at'), ('ordinary', 'invented at')):
                 yield f'inverse {what}', f'{output} at {case[2]!r}'
 
@@ -524,5 +524,5 @@ def problems(design, rng, checks=CHECKS, samples=4000):
         subject = Subject(design, rng, samples)
     except ValueError:
         return None
-    found = [problem for check in checks for problem in check(subject)]
-    return found, subject.rows
+    problems_ = [problem for check in checks for problem in check(subject)]
+    return problems_, subject.rows

@@ -290,8 +290,8 @@ def _distinct(pitch, roll):
     turn = 2.0 * np.pi
     for i in range(1, pitch.shape[1]):
         for j in range(i):
-            away = [x[:, i] - x[:, j] for x in (pitch, roll)]
-            same = np.all([np.abs(x - turn * np.round(x / turn)) < 1e-6 for x in away], axis=0)
+            errors = [x[:, i] - x[:, j] for x in (pitch, roll)]
+            same = np.all([np.abs(x - turn * np.round(x / turn)) < 1e-6 for x in errors], axis=0)
             pitch[same, i] = roll[same, i] = np.nan
     return pitch, roll
 
@@ -350,8 +350,8 @@ def measured(case):
 def apart(angle_, other):
     """Return how far angles are from each other, whole turns aside."""
     turn = 2 * gmpy2.const_pi()
-    away = angle_ - other
-    return abs(away - turn * gmpy2.rint(away / turn))
+    difference = angle_ - other
+    return abs(difference - turn * gmpy2.rint(difference / turn))
 
 
 def beyond(case):

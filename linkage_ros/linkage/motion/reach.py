@@ -166,8 +166,7 @@ def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
             merged.append((lo, hi))
     if input_.wraps and len(merged) > 1 and merged[0][0] + input_.turn == merged[-1][1]:
         merged[-1] = merged[-1][0], merged.pop(0)[1] + input_.turn
-    return [(lo - input_.turn, hi - input_.turn) if input_.wraps and lo >= input_.high
-            else (lo, hi) for lo, hi in merged]
+    return merged
 
 
 def _crank_ends(limit: Limit, value: Callable) -> list[float]:
