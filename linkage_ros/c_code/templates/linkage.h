@@ -395,8 +395,8 @@ static inline int lkr_find(const lkr_model *model, int side, const lkr_real *pos
         distance[k] = lkr_unwrap(model, side, near, q[k]);
     }
     for (tries = 0; tries < count; tries++) {
-        int nearest = 0;
-        for (k = 1; k < count; k++) {
+        int nearest = count - 1;
+        for (k = 0; k < count - 1; k++) {
             nearest = distance[k] < distance[nearest] ? k : nearest;
         }
         memcpy(p->q, q[nearest], sizeof p->q);
