@@ -155,17 +155,18 @@ def main():
             for which, target in TARGETS.items() if shutil.which(f'{target.compiler}gcc')
             for name, outputs in CASES for use in USES]
     text = document.table(['linkage and output', 'target', 'flash [bytes]', 'of it the C library',
-                  'RAM [bytes]', 'stack [bytes]', 'cycles or instructions'], rows)
+                  'RAM [bytes]', 'stack [bytes]', 'cycles or instructions, median', 'at most'],
+                          rows)
     text += '\n\n' + document.table(
         ['linkage and output', *(f'{use} [ns]' for use in USES)],
         [[f'{name} {", ".join(outputs)}', *(
-            time(HERE_, *prepared(name, outputs, 'double', use)) for use in USES)]
+            times(HERE_, *prepared(name, outputs, 'double', use))[1] for use in USES)]
          for name, outputs in CASES])
     document.show(options, 'design/c-code.md', f'{text}\n\n{document.machine()}')
 
 
 def measured(target, text, values):
-    """Return flash, that of the C library, RAM, the stack of the linkage's code, and the time."""
+    """Return flash, that of the C library, RAM, the stack of the linkage's code, and times."""
     body = values['body']
     begin = 'lkr_begin(&{name}_model, &memory);'.format(**values) if 'memory' in body else ''
     sizes = [built(target, ['--specs=nosys.specs'] * ('arm' in target.compiler) + [*extra],
@@ -173,7 +174,7 @@ def measured(target, text, values):
              for extra in ((), ('-c',)) for each in ('', body)]
     (idle, unused, _), (linked, used, _), (empty, *_), (own, _, stack) = sizes
     return [linked - idle, linked - idle - (own - empty), used - unused, stack,
-            time(target, text, values)]
+            *times(target, text, values)]
 
 
 def prepared(name, outputs, number, use):
@@ -208,8 +209,8 @@ def prepared(name, outputs, number, use):
     return header.written(mechanism, outputs, number == 'float', joints), named
 
 
-def time(target, text, values):
-    """Return the longest time of a call."""
+def times(target, text, values):
+    """Return the median and the longest time of a call."""
     with tempfile.TemporaryDirectory() as folder:
         program = compiled(Path(folder), target, target.run_flags,
                            text + (target.clock + TIMED).format(**values))
@@ -217,7 +218,7 @@ def time(target, text, values):
                                  capture_output=True)
     taken = [int(number) for number in re.findall(r'(\d{2,})\.', printed.stdout + printed.stderr)]
     assert len(taken) == POSES, printed
-    return max(taken)
+    return [int(np.median(taken)), max(taken)]
 
 
 def built(target, flags, text):
