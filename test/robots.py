@@ -92,6 +92,7 @@ class Yourdfpy:
     def __init__(self, text):
         library = pytest.importorskip('yourdfpy')
         self.robot = library.URDF.load(BytesIO(text.encode()), load_meshes=False)
+        assert self.robot.validate()
         self.joints = self.robot.actuated_joint_names
 
     def places(self, positions, names, base=None):

@@ -253,7 +253,6 @@ def test_the_margin_of_a_pose_without_rates_is_zero():
     ({'c': 1e-31}, 'dimension c must lie between 1e-30 and 1e\\+30'),
     ({'b': 1e31}, 'dimension b must lie between'),
     ({'a': [1.0, 2.0], 'b': [1.0, 2.0, 3.0]}, r'shapes that broadcast, got a \(2,\), b \(3,\)'),
-    ({'branches': {'B': True}}, 'branch B must be \\+1 or -1, got True'),
     ({'tracer': 'A'}, 'joints and tracer are for type custom or rods, not for slider_crank')])
 def test_wrong_dimensions_branches_and_tracers_are_named(arguments, problem):
     with pytest.raises(ValueError, match=problem):

@@ -64,11 +64,6 @@ def test_nobody_changes_what_others_use():
     assert scene.read({}).mechanisms['jansen'].joints
 
 
-def test_the_scene_without_names_is_of_the_size_of_a_table():
-    assert mechanisms.CATALOGUE == {
-        'water_drop': 0.1, 'jansen': 0.005, 'peaucellier': 0.1, 'slotted_lever': 0.002}
-
-
 @pytest.mark.parametrize('call, reason', [
     (lambda: mechanisms.design('jansn'), r'.* whitworth, custom, rods; did you mean jansen\?$'),
     (lambda: mechanisms.create('watt', joints=[]), 'joints and tracer are for .*, not for watt$'),

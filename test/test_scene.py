@@ -26,7 +26,8 @@ YEAR = 365 * 86400 * 10 ** 9
 
 def test_without_parameters_the_scene_is_the_catalogue():
     shown = scene.read({}).mechanisms
-    assert list(shown) == ['water_drop', 'jansen', 'peaucellier', 'slotted_lever']
+    assert [(name, mechanism.scale) for name, mechanism in shown.items()] == [
+        ('water_drop', 0.1), ('jansen', 0.005), ('peaucellier', 0.1), ('slotted_lever', 0.002)]
     for name, mechanism in shown.items():
         assert mechanism.linkage.type == name
         assert mechanism.linkage.dimensions == mechanisms.defaults(name)

@@ -181,19 +181,8 @@ def test_a_crank_that_cannot_turn_ends_with_its_reach():
         (-2.0 * math.acos(0.25), 2.0 * math.acos(0.25)), abs=1e-15)
     later = limits(tilted('peaucellier', crank__sweep=[math.tau - 1.0, math.tau + 1.0]))
     assert later['crank'] == pytest.approx((math.tau - end, math.tau + end), abs=4e-15)
-
-
-def test_a_crank_of_several_legs_has_no_ends():
+    # Nor has one of several legs.
     assert limits(tilted('peaucellier', mirrored=True))['crank'] is None
-
-
-@pytest.mark.nightly
-def test_the_model_is_valid():
-    assert Yourdfpy(description(tilted('jansen', leg_pairs=3))).robot.validate()
-
-
-def test_the_points_that_are_drawn_as_markers_make_no_difference():
-    assert description(tilted('jansen', points=['G'])) == description(tilted('jansen'))
 
 
 ARM = {'mechanisms': ['hand', 'arm'], 'arm.type': 'four_bar', 'hand.type': 'four_bar',
