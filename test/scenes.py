@@ -5,8 +5,8 @@
 
 from pathlib import Path
 
-from linkage_ros import scene
-from linkage_ros.scene.writing import without_defaults
+from linkage_ros import mechanisms, scene
+from linkage_ros.scene.writing import in_yaml, without_defaults
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = [*sorted((ROOT / 'config').glob('*.yaml')), *sorted((ROOT / 'examples').glob('*.yaml'))]
@@ -35,6 +35,18 @@ G1 = (
 def example(name):
     """Return the parameters of an example."""
     return without_defaults(scene.load(str(next(path for path in EXAMPLES if path.stem == name))))
+
+
+def scene_file(folder, values):
+    """Return a parameter file with values by full parameter name."""
+    path = folder / 'scene.yaml'
+    path.write_text(in_yaml(values))
+    return path
+
+
+def custom(*joints, **more):
+    """Return a linkage of joint lines."""
+    return mechanisms.create('custom', joints=joints, **more)
 
 
 def alone(linkage, name='m', **settings):

@@ -13,13 +13,7 @@ from linkage_ros.scene.legs import LegGroup
 import numpy as np
 import pytest
 from robots import Pinocchio
-from scenes import alone
-
-
-def custom(*joints, **dimensions):
-    """Return a linkage written down."""
-    return mechanisms.create('custom', joints=joints, **dimensions)
-
+from scenes import alone, custom
 
 FOUR_BAR = 'O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'B dyad A Q 3.5 3 left'
 

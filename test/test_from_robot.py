@@ -10,7 +10,7 @@ from pathlib import Path
 import re
 import shlex
 
-from linkage_ros import mechanisms, scene
+from linkage_ros import scene
 from linkage_ros.cli import RequestError
 from linkage_ros.robot_files import cli, closing, readers
 from linkage_ros.robot_model.cli import main as robot_model
@@ -29,6 +29,7 @@ from robots import (
     words,
     written,
 )
+from scenes import custom
 from test_robot_files import CUT, loops_of, random_robot, robot_of
 import yaml
 
@@ -198,8 +199,7 @@ def test_all_that_is_printed_of_a_robot():
 @pytest.mark.parametrize('word', ['parallelogram', 'antiparallelogram', 'mirror'])
 @pytest.mark.parametrize('base', ['0.6 0', '0.5 -0.3'])
 def test_bars_that_mirror_others_have_a_word_of_their_own(word, base):
-    linkage = mechanisms.create('custom', joints=[
-        'A ground 0 0', f'B ground {base}', 'C crank A 0.2', f'D {word} A C B'])
+    linkage = custom('A ground 0 0', f'B ground {base}', 'C crank A 0.2', f'D {word} A C B')
     parameters, reports, still = cli.described(robot_of(linkage, 0.7))
     ground, _, crank, line, *_ = parameters['crank.joints']
     assert (ground, crank, line) == ('A ground 0 0', 'C crank A 0.2', f'D {word} A C B')
@@ -208,8 +208,8 @@ def test_bars_that_mirror_others_have_a_word_of_their_own(word, base):
 
 @pytest.mark.parametrize('more, word', [(1e-13, 'parallelogram'), (1e-10, 'dyad')])
 def test_bars_that_differ_by_more_than_rounding_are_no_parallelogram(more, word):
-    linkage = mechanisms.create('custom', joints=[
-        'A ground 0 0', 'B ground 0.6 0', 'C crank A 0.2', f'D dyad B C {0.2 + more!r} 0.6 right'])
+    linkage = custom('A ground 0 0', 'B ground 0.6 0', 'C crank A 0.2',
+                     f'D dyad B C {0.2 + more!r} 0.6 right')
     assert cli.described(robot_of(linkage, 0.7))[0]['crank.joints'][3].split()[1] == word
 
 

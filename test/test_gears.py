@@ -6,12 +6,11 @@
 from fractions import Fraction
 import math
 
-from linkage_ros import mechanisms
 from linkage_ros.c_code import header
 from linkage_ros.scene.motion import Motion
 import numpy as np
 import pytest
-from scenes import alone
+from scenes import alone, custom
 
 # Ratios with their periods.
 RATIOS = {'1/64': 64, '1/80': 80, '1/100': 100, '0.31': 100, '22/7': 7, '3/7': 7, '-2.37': 100,
@@ -26,15 +25,14 @@ QUICK = '1/3', 'sqrt(2)', '8'
 
 def motor(ratio, *more):
     """Return a motor, and a crank that is geared to it."""
-    return mechanisms.create('custom', joints=[
-        'O ground 0 0', 'M crank O 0.01', f'A crank O 1 geared crank {ratio} 0', *more])
+    return custom('O ground 0 0', 'M crank O 0.01', f'A crank O 1 geared crank {ratio} 0', *more)
 
 
 def two(ratio):
     """Return a rocker on the motor's crank, and a bar from it to a geared crank."""
-    return mechanisms.create('custom', joints=[
-        'O ground 0 0', 'Q ground 3 0', 'R ground 10 0', 'A crank O 1',
-        f'D crank R 1 geared crank {ratio} 0.3', 'B dyad A Q 2.5 2 left', 'E dyad B D 9 8 left'])
+    return custom('O ground 0 0', 'Q ground 3 0', 'R ground 10 0', 'A crank O 1',
+                  f'D crank R 1 geared crank {ratio} 0.3', 'B dyad A Q 2.5 2 left',
+                  'E dyad B D 9 8 left')
 
 
 @pytest.mark.parametrize('ratio, period', RATIOS.items())
@@ -75,10 +73,9 @@ def test_a_pose_is_answered_in_the_turn_in_which_it_is(ratio):
     (('drive', 'shaft'), ('QB', 'drive', 'shaft'))])
 def test_a_branch_continues_through_change_points_in_any_turn(turns, more, outputs):
     # Each crank passes through the other ground joint of its dyad, whose bars are equal.
-    linkage = mechanisms.create('custom', joints=[
-        'O ground 0 0', 'Q ground 1 0', 'R ground 5 0', 'S ground 6 0', 'A crank O 1',
-        'B dyad A Q 2.5 2.5 left', 'D crank R 1 geared crank -sqrt(2) 0', 'E dyad D S 2 2 left',
-        *(f'M{name} crank S 1 called {name}' for name in more)])
+    linkage = custom('O ground 0 0', 'Q ground 1 0', 'R ground 5 0', 'S ground 6 0', 'A crank O 1',
+                     'B dyad A Q 2.5 2.5 left', 'D crank R 1 geared crank -sqrt(2) 0',
+                     'E dyad D S 2 2 left', *(f'M{name} crank S 1 called {name}' for name in more))
     theta = [0.4 + math.tau * turns, *[0.3] * len(more)]
     for chosen in [outputs] if more else [(name,) for name in outputs]:
         values = list(linkage.joint_angles(theta if more else theta[0], chosen).values())
@@ -104,8 +101,8 @@ ONE = 'D crank O 0.7 geared crank {} 0.3; B dyad D Q 0.9 1.2 left'
     *((ratio, ONE) for ratio in ('2', '-3', '0.5')), ('1/3', BOTH), ('0.31', BOTH), ('1/80', BOTH),
     pytest.param('1000', BOTH, marks=pytest.mark.nightly), ('sqrt(2)', BOTH), ('0.12345', BOTH)])
 def test_the_reach_is_where_it_can_be_assembled(ratio, lines):
-    linkage = mechanisms.create('custom', joints=[
-        'O ground 0 0', 'Q ground 2 0', 'A crank O 1', *lines.format(ratio).split('; ')])
+    linkage = custom('O ground 0 0', 'Q ground 2 0', 'A crank O 1',
+                     *lines.format(ratio).split('; '))
     first, = linkage.inputs
     theta = np.random.default_rng(0).uniform(first.low, first.high, 4001)
     assembled = np.isfinite(linkage.solve(theta)['B']).all(axis=1)

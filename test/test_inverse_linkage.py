@@ -8,6 +8,7 @@ import math
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
+from scenes import custom
 
 FIVE_BAR = """\
 # five_bar driven by P.x, P.y
@@ -18,11 +19,6 @@ Y block X 0.0 0.118
 P carriage X along Y -1.912 1.912    # at P.y
 A dyad O P 0.09 0.09 right
 C dyad Q P 0.09 0.09 right"""
-
-
-def custom(*joints, **numbers):
-    """Return a linkage of joint lines."""
-    return mechanisms.create('custom', joints=joints, **numbers)
 
 
 def test_the_joint_lines_of_an_inverse_are_printed():

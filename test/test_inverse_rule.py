@@ -8,6 +8,7 @@ import math
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
+from scenes import custom
 from truth import inverse_judge, linkage_checks
 
 FOUR_BAR = 'P.x', 'P.y', 'B.x', 'B.y', 'QB', 'AB'
@@ -70,8 +71,7 @@ SPECIAL = {
 @pytest.mark.parametrize('special', SPECIAL)
 def test_special_linkages_have_each_pose_and_no_other(special):
     lines, numbers, outputs, inputs = SPECIAL[special]
-    linkage = mechanisms.create(lines, **numbers) if isinstance(lines, str) else \
-        mechanisms.create('custom', joints=lines, **numbers)
+    linkage = mechanisms.create(lines, **numbers) if isinstance(lines, str) else custom(*lines)
     first, = linkage.inputs
     for output in outputs:
         pose, size = linkage.compiled('checked', (output,)), (
@@ -127,9 +127,8 @@ def test_with_the_other_inputs_held_a_search_loses_nothing_next_to_an_extreme():
 
 
 def test_another_assembly_mode_leads_to_no_solution():
-    linkage = mechanisms.create('custom', joints=[
-        'A ground 0 0', 'B ground -2.19 0', 'C crank A 2.189999999999781',
-        'D dyad C B 2.19 2.189999999999781 right', 'E cylinder A D 2.19 right'])
+    linkage = custom('A ground 0 0', 'B ground -2.19 0', 'C crank A 2.189999999999781',
+                     'D dyad C B 2.19 2.189999999999781 right', 'E cylinder A D 2.19 right')
     for theta in np.linspace(2.8, 3.1, 20).tolist():
         value = float(linkage.joint_angles((theta, 3.0), ['D.x'])['D.x'])
         cranks = [solution.inputs[0] for solution in linkage.inverse(
@@ -138,10 +137,10 @@ def test_another_assembly_mode_leads_to_no_solution():
 
 
 def test_rates_where_a_pose_has_none_are_those_of_the_nearest_float_that_has_them():
-    linkage = mechanisms.create('custom', joints=[
-        'A ground 0 0', 'B ground 2.1 -0.0714483557885009', 'C crank A 1.100977588441',
-        'D slider C 2.3782075834 A along B out', 'E dyad D A 1.5 0.5971384475097938 right',
-        'G slider D 0.4768848 C along A in'])
+    linkage = custom('A ground 0 0', 'B ground 2.1 -0.0714483557885009',
+                     'C crank A 1.100977588441', 'D slider C 2.3782075834 A along B out',
+                     'E dyad D A 1.5 0.5971384475097938 right',
+                     'G slider D 0.4768848 C along A in')
     start, _ = linkage.reach()[0]
     (theta,), (rate,) = linkage.inverse('DG').nearest(
         (float(linkage.joint_angles(start, ['DG'])['DG']),), (start,))
@@ -160,9 +159,8 @@ def test_an_extreme_as_the_library_says_it_has_an_answer():
 
 @pytest.mark.parametrize('ratio', ['1/2', '1/3', '3/4'])
 def test_the_end_of_a_long_period_has_a_pose_a_period_away_too(ratio):
-    linkage = mechanisms.create('custom', joints=[
-        'O ground 0 0', 'Q ground 4 0', 'A crank O 1', f'D crank Q 2 geared crank {ratio} 0',
-        'B dyad A D 2.2 2 left'])
+    linkage = custom('O ground 0 0', 'Q ground 4 0', 'A crank O 1',
+                     f'D crank Q 2 geared crank {ratio} 0', 'B dyad A D 2.2 2 left')
     pose, (first,) = linkage.compiled('checked', ('B.x',)), linkage.inputs
     for end in (end for arc in linkage.reach() for end in arc):
         for answer in linkage.input_for('B.x', pose.at(end)[0]).tolist():
@@ -174,7 +172,7 @@ def test_the_end_of_a_long_period_has_a_pose_a_period_away_too(ratio):
                                                (1e-8, 0), (1e-3, 0)])
 def test_next_to_an_extreme_values_have_two_solutions_or_its_own_or_none(distance, answers):
     engine = mechanisms.create('slider_crank', a=40.0, b=120.0, c=0.0)
-    crank = mechanisms.create('custom', joints=['O ground -1 0', 'A crank O 1'])
+    crank = custom('O ground -1 0', 'A crank O 1')
     for linkage, output, extreme in (engine, 'block', 160.0), (crank, 'A.x', 0.0):
         solutions = linkage.inverse(output).all(extreme + distance * linkage.longest)
         assert len(solutions) == answers
@@ -203,7 +201,7 @@ def test_the_jacobian_has_a_row_for_each_output():
         'K dyad E G 2.23494351 2.306645367473 left'])])
 def test_next_to_an_extreme_and_at_an_end_a_pose_is_found_with_another_input_held_too(
         output, held, at, lines):
-    linkage = mechanisms.create('custom', joints=lines)
+    linkage = custom(*lines)
     for theta in [at] if at else np.ravel(linkage.reach(held)).tolist():
         value = float(linkage.joint_angles((theta, held), [output])[output])
         solutions = linkage.inverse((output, 'drive')).all((value, held))

@@ -12,6 +12,7 @@ from effort import few_calls
 from linkage_ros import mechanisms, scene
 import numpy as np
 import pytest
+from scenes import custom
 from truth.hostile_texts import mutations, NUMBERS, TEXTS
 
 FOUR_BAR = ('O ground 0 0', 'Q ground g 0', 'A crank O m', 'B dyad A Q b c left')
@@ -22,8 +23,7 @@ LENGTHS = {'g': 4.0, 'm': 1.0, 'b': 3.0, 'c': 2.5}
 
 def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     """Return a four-bar with more lines."""
-    return mechanisms.create('custom', joints=(*lines, *more), branches=branches,
-                             **{**LENGTHS, **dimensions})
+    return custom(*lines, *more, branches=branches, **{**LENGTHS, **dimensions})
 
 
 @pytest.mark.parametrize('line, problem', [
@@ -430,9 +430,8 @@ def test_an_input_has_the_name_that_its_line_gives_it():
             'geared crank')) for line in lines])
     for name, place in linkage.solve([0.3, 0.7]).items():
         assert (place == usual.solve([0.3, 0.7])[name]).all()
-    mirrored = mechanisms.create('custom', joints=(
-        'O ground 0 0', 'H ground 0 1', 'P ground 1 0', 'B cylinder P O 1 left called ram',
-        'X mirrored O H'))
+    mirrored = custom('O ground 0 0', 'H ground 0 1', 'P ground 1 0',
+                      'B cylinder P O 1 left called ram', 'X mirrored O H')
     assert [input_.name for input_ in mirrored.inputs] == ['ram']
     place = mirrored.solve(1.2)
     assert place['BX'] == pytest.approx(place['B'] * (-1.0, 1.0))
@@ -446,9 +445,8 @@ def test_an_input_has_the_name_that_its_line_gives_it():
     ('A dyad O Q 3 3 left called x', 'expected')])
 def test_an_input_cannot_have_any_name(line, reason):
     with pytest.raises(ValueError, match=reason):
-        mechanisms.create('custom', joints=(
-            'O ground 0 0', 'Q ground 3 0', *line.split('; '), 'B dyad A Q 3 2.5 left',
-            'C crank O 2'))
+        custom('O ground 0 0', 'Q ground 3 0', *line.split('; '), 'B dyad A Q 3 2.5 left',
+               'C crank O 2')
 
 
 # --- images in a mirror line: every joint is where the mirror shows it ---
@@ -475,8 +473,7 @@ def test_every_construction_has_its_image(up, others):
     lines = [line + up if line == 'A crank K 0.2' else line for line in ALL]
     drawn = mechanisms.design('custom', lines).branches
     assert [*drawn] == ['B', 'S', 'L', 'F']
-    linkage = mechanisms.create('custom', joints=lines, branches={
-        name: -drawn[name] for name in others})
+    linkage = custom(*lines, branches={name: -drawn[name] for name in others})
     assert [input_.name for input_ in linkage.inputs] == ['carriage', 'crank', 'crank2']
     count = 0
     for values in np.random.default_rng(3).uniform((0.15, -3.0, -3.0), (0.55, 3.0, 3.0), (40, 3)):
@@ -490,9 +487,8 @@ def test_every_construction_has_its_image(up, others):
 
 
 def test_an_image_may_be_mirrored_again():
-    linkage = mechanisms.create('custom', joints=(
-        'O ground 0 0', 'H ground 1 0', 'V ground 0 1', 'K ground 2 1', 'A crank K 0.5 up',
-        'x mirrored O H', 'y mirrored O V'))
+    linkage = custom('O ground 0 0', 'H ground 1 0', 'V ground 0 1', 'K ground 2 1',
+                     'A crank K 0.5 up', 'x mirrored O H', 'y mirrored O V')
     place = {name: complex(*at) for name, at in linkage.solve(0.4).items()}
     assert place['Ax'] == pytest.approx(place['A'].conjugate())
     assert place['Ay'] == pytest.approx(-place['A'].conjugate())
@@ -505,9 +501,9 @@ def test_an_image_may_be_mirrored_again():
 @pytest.mark.parametrize('line', ['B dyad A Q 0.6 0.2 left', 'B dyad A Q 0.9 0.5 right',
                                   'B slider A 0.2 O 0.4 out', 'B slider A 0.2 O 90deg in'])
 def test_an_image_passes_change_points_as_what_it_shows_does(line, ground, zero):
-    linkage = mechanisms.create('custom', joints=(
-        'O ground 0 0', 'Z ground 0.1 -0.2', f'Q ground {ground}', f'A crank O 0.2{zero}', line,
-        'y1 ground 0.3 0.1', 'y2 ground 0.5 0.9', 'm mirrored y1 y2'))
+    linkage = custom('O ground 0 0', 'Z ground 0.1 -0.2', f'Q ground {ground}',
+                     f'A crank O 0.2{zero}', line, 'y1 ground 0.3 0.1', 'y2 ground 0.5 0.9',
+                     'm mirrored y1 y2')
     for crank in np.linspace(-3.1, 3.1, 13):
         places, images = seen(linkage.solve(crank), 'y1', 'y2')
         near = 1e-14 * max(map(abs, places.values()))

@@ -10,7 +10,7 @@ import math
 from linkage_ros import mechanisms, scene
 import numpy as np
 import pytest
-from scenes import ROOT
+from scenes import custom, ROOT
 from truth.cases import CASES
 
 # Outputs with an inverse in closed form.
@@ -29,9 +29,8 @@ def linkage(kind):
     files = {'ankle': ROOT / 'examples' / 'ankle.yaml',
              'excavator': ROOT / 'config' / 'excavator.yaml'}
     if kind == 'geared':
-        return mechanisms.create('custom', joints=(
-            'O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'C crank Q 0.5 geared crank -2 0.3',
-            'B dyad A C 2 2 left'))
+        return custom('O ground 0 0', 'Q ground 2 0', 'A crank O 1',
+                      'C crank Q 0.5 geared crank -2 0.3', 'B dyad A C 2 2 left')
     if kind in files:
         return scene.load(files[kind]).mechanisms[kind].linkage
     if kind in CASES:
@@ -218,8 +217,8 @@ def test_every_output_has_the_library_s_choice(kind):
 
 
 def test_in_single_precision_solutions_next_to_a_dead_point_are_there():
-    large = mechanisms.create('custom', joints=(
-        'A ground 0 -4.7e5', 'C ground 1.8e6 0', 'D crank C 1.2e6', 'E antiparallelogram C D A'))
+    large = custom('A ground 0 -4.7e5', 'C ground 1.8e6 0', 'D crank C 1.2e6',
+                   'E antiparallelogram C D A')
     inverse = large.inverse('E.y')
     cranks = next(place for place in large.dead_points() if place > 0.0) + np.linspace(-0.01, 0.01)
     results, = inverse.function(np, follows=True)(*(x.astype('f4') for x in (

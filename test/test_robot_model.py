@@ -16,7 +16,7 @@ from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD, shapes
 import numpy as np
 import pytest
 from robots import turned
-from scenes import alone
+from scenes import alone, scene_file
 from test_simulators import model, simulated, some_quick
 from test_urdf import ARM, FROM_CASES, in_space, joints_and_places, MECHANISMS
 
@@ -265,9 +265,8 @@ def test_coordinates_of_a_pose_give_the_pose(place, angles):
 
 
 def test_the_command_prints_what_its_options_ask_for(tmp_path, capsys):
-    file = tmp_path / 'scene.yaml'
-    file.write_text('/**:\n  ros__parameters:\n    mechanisms: [a, b]\n    a.type: four_bar\n'
-                    '    b.type: jansen\n    frame_id: base\n')
+    file = scene_file(tmp_path, {'mechanisms': ['a', 'b'], 'a.type': 'four_bar',
+                                 'b.type': 'jansen', 'frame_id': 'base'})
     several, lever = scene.load(str(file)).mechanisms, scene.load('config/slotted_lever.yaml')
     for options, mechanisms, frame, width, density in (
             ([], scene.read({}).mechanisms.values(), 'world', None, []),

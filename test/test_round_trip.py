@@ -14,7 +14,7 @@ from linkage_ros.robot_model.robot import with_positions
 import numpy as np
 import pytest
 from robots import FIRST, of_text, ROBOTS, turned
-from scenes import EXAMPLES
+from scenes import alone, EXAMPLES
 from test_robot_files import moves, random_linkage
 from test_urdf import ARM
 
@@ -129,18 +129,17 @@ def random_mechanism(seed):
     if not (made := random_linkage(seed)):
         return None
     design, linkage, values, rng = made
-    parameters = {
-        'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': design.joints,
-        'm.pose': rng.normal(size=6).tolist(),
-        **{f'm.branches.{key}': side for key, side in (design.branches or {}).items()},
-        **{f'm.dimensions.{key}': value for key, value in design.dimensions.items()},
-        **{f'm.{each.name}.start': value for each, value in zip(linkage.inputs, values)}}
+    settings = {
+        'pose': rng.normal(size=6).tolist(),
+        **{f'branches.{key}': side for key, side in (design.branches or {}).items()},
+        **{f'dimensions.{key}': value for key, value in design.dimensions.items()},
+        **{f'{each.name}.start': value for each, value in zip(linkage.inputs, values)}}
     with suppress(scene.SceneError):
         # Not all of it need be in the reach.
-        return scene.read({**parameters, **{
-            f'm.{each.name}.sweep': [value - 0.01 * each.size, value + 0.01 * each.size]
-            for each, value in zip(linkage.inputs, values)}}).mechanisms['m']
-    return scene.read(parameters).mechanisms['m']
+        return alone(design.joints, **settings, **{
+            f'{each.name}.sweep': [value - 0.01 * each.size, value + 0.01 * each.size]
+            for each, value in zip(linkage.inputs, values)})
+    return alone(design.joints, **settings)
 
 
 @pytest.mark.parametrize('form', FORMATS)

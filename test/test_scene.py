@@ -18,7 +18,7 @@ from linkage_ros.scene.motion import Motion
 import numpy as np
 import pytest
 from pytest import approx
-from scenes import alone, BOOM, EXAMPLES, G1, ROOT
+from scenes import alone, BOOM, custom, EXAMPLES, G1, ROOT, scene_file
 
 OWN = {'mechanisms': ['own'], 'own.type': 'custom'}
 YEAR = 365 * 86400 * 10 ** 9
@@ -39,9 +39,8 @@ def test_without_parameters_the_scene_is_the_catalogue():
 
 def rewritten(before, folder):
     """Return the values with which a scene is written, and the scene that is read of them."""
-    values, file = writing.without_defaults(before), folder / 'again.yaml'
-    file.write_text(writing.in_yaml(values))
-    return values, scene.load(str(file))
+    values = writing.without_defaults(before)
+    return values, scene.load(str(scene_file(folder, values)))
 
 
 @pytest.mark.nightly(all_but=4)
@@ -436,16 +435,15 @@ def test_an_end_of_the_reach_is_within_it_any_turn_and_nothing_beyond_is():
                     beyond = leg.side * outwards * 2e-12
                     assert legs.within_reach(crank)[i]
                     assert not legs.within_reach(crank + beyond)[i]
-    boom = LegGroup(mechanisms.create('custom', joints=BOOM), scale=2.0)
+    boom = LegGroup(custom(*BOOM), scale=2.0)
     assert [boom.within_reach(2.0 * (end + step)) for end in boom.reach[0] for step in (
         -1e-6, 1e-6)] == [[False], [True], [True], [False]]
 
 
 def test_the_locus_is_that_of_the_tracer_or_last_point_on_the_widest_arc():
     assert [alone('jansen', points=[*names]).tracer for names in ('GA', 'BA')] == ['G', 'A']
-    legs = LegGroup(mechanisms.create('custom', joints=[
-        'O ground 0 0', 'Q ground 1.2 0', 'F ground 0.7 1.4', 'A crank O 0.6',
-        'B dyad A Q 1.9 0.9 left', 'C dyad B F 0.4 1.2 left']))
+    legs = LegGroup(custom('O ground 0 0', 'Q ground 1.2 0', 'F ground 0.7 1.4', 'A crank O 0.6',
+                           'B dyad A Q 1.9 0.9 left', 'C dyad B F 0.4 1.2 left'))
     _, widest = legs.reach
     assert np.angle(legs.locus('A')[[0, -1]] @ (1.0, 1j)) == approx(widest)
 

@@ -11,7 +11,7 @@ from linkage_ros.linkage import Solution
 from linkage_ros.scene.inverse_request import InverseRequest
 import numpy as np
 import pytest
-from scenes import alone
+from scenes import alone, custom
 from truth.cases import CASES
 from truth.working_modes import arm, excavator
 
@@ -184,12 +184,12 @@ def test_answers_lie_in_the_sweeps_or_the_reason_says_so():
 
 def test_an_output_that_stands_still_in_most_poses_is_answered_where_it_moves():
     # Nearly equal bars: the block stays at the crank's centre in one half of the turn.
-    linkage = mechanisms.create('custom', joints=[
-        'A ground 0 0', 'B ground 0.432105123617702 0', 'C ground d1 0', 'D crank C d2',
-        'E cylinder B A 2.189315412 left called drive', 'F slider D d3 A along B out',
-        'G dyad A F d4 d4 right', 'H line F G d6', 'J K L inversor A F d7 2.0073'],
-        d1=2.2362640741019026, d2=0.8931826658923526, d3=0.8931826658923615, d4=2.6947387147872717,
-        d6=5.557896960568358, d7=0.8324685908048884)
+    linkage = custom('A ground 0 0', 'B ground 0.432105123617702 0', 'C ground d1 0',
+                     'D crank C d2', 'E cylinder B A 2.189315412 left called drive',
+                     'F slider D d3 A along B out', 'G dyad A F d4 d4 right', 'H line F G d6',
+                     'J K L inversor A F d7 2.0073', d1=2.2362640741019026, d2=0.8931826658923526,
+                     d3=0.8931826658923615, d4=2.6947387147872717, d6=5.557896960568358,
+                     d7=0.8324685908048884)
     length = 2.403985938284456
     for crank in (1.45, 2.5):
         value = float(linkage.solve((crank, length))['J'][1])
@@ -200,9 +200,8 @@ def test_an_output_that_stands_still_in_most_poses_is_answered_where_it_moves():
 
 @pytest.mark.parametrize('unit', [1.0, 1e-26, 1e20])
 def test_what_is_searched_is_found_in_any_unit(unit):
-    linkage = mechanisms.create('custom', joints=(
-        'A ground 0 0', 'B ground 0 c', 'E crank B e', 'F cylinder A E f right'),
-        c=3.6 * unit, e=0.42 * unit, f=4.0 * unit)
+    linkage = custom('A ground 0 0', 'B ground 0 c', 'E crank B e', 'F cylinder A E f right',
+                     c=3.6 * unit, e=0.42 * unit, f=4.0 * unit)
     pose, outputs = (0.04, 1.4 * unit), ('F.x', 'barrel')
     values = [float(linkage.solve(pose)['F'][0]), float(linkage.joint_angles(pose)['barrel'])]
     solutions = linkage.inverse(outputs).all(values)

@@ -25,7 +25,7 @@ from linkage_ros.c_code.axes import joints
 from linkage_ros.c_code.package import package
 import numpy as np
 import pytest
-from scenes import alone, BOOM, DRAG, G1, LIFT, ROOT, SLOT
+from scenes import alone, BOOM, custom, DRAG, G1, LIFT, ROOT, scene_file, SLOT
 
 COMPILERS = [pytest.param(name, marks=pytest.mark.skipif(
     not shutil.which(name), reason=f'{name} is not installed')) for name in ('g++', 'clang++')]
@@ -124,8 +124,7 @@ def test_what_is_not_assembled_is_out_of_reach_whatever_is_commanded(tmp_path):
     assert own[0] < low - 0.1 and own[-1] > high + 0.1
 
 
-READING, TOP = mechanisms.create('custom', joints=LIFT).joint_angles(
-    [0.5, -2.5])['QB'] - (0.1, 0.0)
+READING, TOP = custom(*LIFT).joint_angles([0.5, -2.5])['QB'] - (0.1, 0.0)
 CHOICES = [
     # A geared joint counts turns both ways, and so does an encoder on it.
     (GEARED, {}, [], 1, [(value, -0.5 * value) for value in (1.0, -6.4, -7.0, -20.0)]),
@@ -166,7 +165,7 @@ CHOICES = [
        [(0.02 * math.cos(end), end)]) for end in (0.6, 0.7, 0.9, 1.0, 1.1)),
     # A turn from what is nearest may be in it.
     *((DRAG, {'crank.start': 0.0, 'crank.sweep': sorted((0.0, side * 5.0))}, ['QB'], 1,
-       [(mechanisms.create('custom', joints=DRAG).joint_angles(side * 4.5)['QB'], side * 4.5)])
+       [(custom(*DRAG).joint_angles(side * 4.5)['QB'], side * 4.5)])
       for side in (1.0, -1.0)),
     # What is beyond it by more weighs ten times.
     (SLOT, {'crank.measures': 'A.y', 'crank.start': 0.2, 'crank.sweep': [-1.0, 0.2]},
@@ -481,10 +480,10 @@ def test_joint_limits_are_those_of_all_poses(capsys, path):
 
 
 def test_joint_limits_can_be_commanded_and_measured(capsys, tmp_path):
-    limits, mechanisms, file = {}, [], tmp_path / 'watt.yaml'
+    limits, mechanisms = {}, []
     # A joint beyond half a turn, and one that passes it.
-    file.write_text('/**: {ros__parameters: {mechanisms: [four, watt], watt: {type: watt}, '
-                    'four: {type: four_bar, joint_names: [QB=four-6.0]}}}')
+    file = scene_file(tmp_path, {'mechanisms': ['four', 'watt'], 'watt.type': 'watt',
+                                 'four.type': 'four_bar', 'four.joint_names': ['QB=four-6.0']})
     for path in (ROOT / 'examples' / 'leg.yaml', ROOT / 'config' / 'slotted_lever.yaml', file):
         limits |= limits_of(capsys, path)
         mechanisms += scene.load(path).mechanisms.values()
@@ -499,24 +498,21 @@ def test_joint_limits_can_be_commanded_and_measured(capsys, tmp_path):
 
 
 def test_joint_limits_of_an_input_are_those_of_its_poses(capsys, tmp_path):
-    file = tmp_path / 'five.yaml'
-    file.write_text('/**: {ros__parameters: {mechanisms: [five], five: {type: custom, joints: ['
-                    'O ground 0 0, Q ground 1 0, A crank O 0.5, B crank Q 0.2, '
-                    'C dyad A B 0.6 0.3 left]}}}')
+    file = scene_file(tmp_path, {'mechanisms': ['five'], 'five.type': 'custom', 'five.joints': [
+        'O ground 0 0', 'Q ground 1 0', 'A crank O 0.5', 'B crank Q 0.2',
+        'C dyad A B 0.6 0.3 left']})
     # A is no farther from Q than B and both bars, 1.1 m.
     limits = limits_of(capsys, file, '--joints', 'five_crank', 'five_crank2')['five_crank']
     np.testing.assert_allclose(limits, [-math.acos(0.04), math.acos(0.04)], atol=0.02)
 
 
-@pytest.mark.parametrize('name, more, limits', [
-    ('QB', '', False), ('crank', '', False), ('crank2', '', False),
-    ('crank2', 'crank.sweep: [-1.0, 20.0], ', (-40.0, 2.0)), ('crank', 'crank.sweep: [0.0, 9.0], ',
-                                                             (0.0, 9.0))])
-def test_a_joint_that_turns_has_no_limits(capsys, tmp_path, name, more, limits):
-    file = tmp_path / 'turning.yaml'
-    file.write_text('/**: {ros__parameters: {mechanisms: [drag], drag: {type: custom, ' + more
-                    + 'joints: [O ground 0 0, Q ground 0.3 0, A crank O 1, B dyad A Q 0.9 1.1 '
-                    'left, D crank Q 0.3 geared crank -2 0]}}}')
+@pytest.mark.parametrize('name, sweep, limits', [
+    ('QB', [], False), ('crank', [], False), ('crank2', [], False),
+    ('crank2', [-1.0, 20.0], (-40.0, 2.0)), ('crank', [0.0, 9.0], (0.0, 9.0))])
+def test_a_joint_that_turns_has_no_limits(capsys, tmp_path, name, sweep, limits):
+    file = scene_file(tmp_path, {
+        'mechanisms': ['drag'], 'drag.type': 'custom', 'drag.crank.sweep': sweep,
+        'drag.joints': [*DRAG, 'D crank Q 0.3 geared crank -2 0']})
     assert limits_of(capsys, file, '--joints', f'drag_{name}') == {f'drag_{name}': limits}
 
 
