@@ -119,10 +119,8 @@ class Panel:
         if 'guides' in parts:
             layers.guides(axes, mechanism, self.cycle, unit)
         self.moving.append(layers.Legs(axes, mechanism, self.cycle, parts, unit))
-        self._names = None
         if 'labels' in parts and len(self.cycle.prefixes) == 1:
-            self._names = layers.Names(axes, mechanism, self.cycle, unit)
-            self.moving.append(self._names)
+            self.moving.append(layers.Names(axes, mechanism, self.cycle, unit))
         if parts & {'title', 'dimensions'}:
             self.moving.append(layers.Headline(axes, mechanism, parts, unit, single))
         self._dress('axes' in parts, unit)
@@ -160,8 +158,8 @@ class Panel:
 
     def settle(self, times):
         """Place the joints' names for poses at these times [turns]."""
-        if self._names:
-            self._names.settle(np.stack([self.cycle.pose(turns).places for turns in times]))
+        for names in [layer for layer in self.moving if isinstance(layer, layers.Names)]:
+            names.settle(np.stack([self.cycle.pose(turns).places for turns in times]))
 
     def show(self, turns):
         """Move all layers to a time [turns of the crank]."""

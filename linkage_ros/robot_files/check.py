@@ -142,9 +142,9 @@ class _Loops:
         self._ends: dict[str, tuple[float, float]] = {}
         for drive in (drive for made in parts for drive in mechanisms[made.name].inputs.values()):
             around = math.pi if drive.input.is_angle else 0.5 * component.size
-            low, high = drive.ends or (drive.start - around, drive.start + around)
-            ends = sorted((end - drive.offset) / drive.ratio for end in (
-                max(low, drive.start - 2.0 * around), min(high, drive.start + 2.0 * around)))
+            around = 2.0 * around if drive.ends else around
+            ends = sorted((end - drive.offset) / drive.ratio for end in np.clip(
+                drive.ends or (-math.inf, math.inf), drive.start - around, drive.start + around))
             low, high = self._ends.get(drive.source, ends)
             self._ends[drive.source] = max(low, ends[0]), min(high, ends[1])
         self._slack = MISFIT * max(made.slack for made in parts)

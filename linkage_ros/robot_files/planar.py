@@ -256,8 +256,6 @@ class Drawing(Dyads):
 
         Raises ValueError if there is none, as no word places a second joint on a block or barrel.
         """
-        if not self.parts.keys() >= {*joint.bodies}:
-            raise ValueError(joint.name)
         parent, child = joint.bodies
         if joint.kind == SLIDE:
             block, = (body for body in joint.bodies if self.parts[body].slide is joint)
@@ -421,7 +419,7 @@ def _joints(drawing: Drawing) -> list[tuple[str, float, str, float]]:
     """Return the link, the sign, the name and the position of each joint that links measure."""
     measured = []
     read = {joint.name for joint in drawing.driven} | {drive.source for drive in drawing.drives}
-    for joint in drawing.joints:
+    for joint in [joint for joint in drawing.joints if drawing.parts.keys() >= {*joint.bodies}]:
         with suppress(ValueError):
             if joint.position is not None and joint.name not in read:
                 measured.append((joint, *drawing.measured_by(joint)))
