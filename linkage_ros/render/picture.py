@@ -83,12 +83,12 @@ class Picture:
         self.figure.set_layout_engine('none')
         chosen = times[::math.ceil(len(times) / MAX_POSES)]
         for panel in self.panels:
-            panel.settle([self._turns(panel, turns) for turns in chosen])
+            panel.settle([self.seconds(turns) / panel.cycle.period for turns in chosen])
 
     def show(self, turns):
         """Move all panels to a time [turns of the first mechanism's crank]."""
         for panel in self.panels:
-            panel.show(self._turns(panel, turns))
+            panel.show(self.seconds(turns) / panel.cycle.period)
 
     def at(self, turns):
         """Return the picture at a time [turns], shape (height, width, 3), 8 bits per colour."""
@@ -99,10 +99,6 @@ class Picture:
     def seconds(self, turns):
         """Return the duration of turns [s]; 0 if the first mechanism stands still."""
         return turns * self.period if math.isfinite(self.period) else 0.0
-
-    def _turns(self, panel, turns):
-        """Return the turns of one mechanism in the time of some turns of the first."""
-        return self.seconds(turns) / panel.cycle.period
 
 
 class Panel:
@@ -125,14 +121,6 @@ class Panel:
             self.moving.append(layers.Headline(axes, mechanism, parts, unit, single))
         self._dress('axes' in parts, unit)
 
-    def _drawn(self):
-        """Return the lowest and the highest x and y drawn in a turn [m]."""
-        course, joints = self.cycle.course, len(self.mechanism.linkage.points)
-        places = [course[:, :, self._joints].reshape(-1, 2), course[:, :, joints:].reshape(-1, 2)]
-        places += [line.get_xydata() for line in self._axes.lines if len(line.get_xdata()) > 2]
-        drawn = np.concatenate(places)
-        return np.nanmin(drawn, axis=0), np.nanmax(drawn, axis=0)
-
     def _dress(self, axes_shown, unit):
         if not axes_shown:
             self._axes.set_axis_off()
@@ -147,7 +135,11 @@ class Panel:
 
     def fill(self):
         """Set limits around all that is drawn, at one scale; SceneError if too small."""
-        low, high = self._drawn()
+        course, joints = self.cycle.course, len(self.mechanism.linkage.points)
+        places = [course[:, :, self._joints].reshape(-1, 2), course[:, :, joints:].reshape(-1, 2)]
+        places += [line.get_xydata() for line in self._axes.lines if len(line.get_xdata()) > 2]
+        drawn = np.concatenate(places)
+        low, high = np.nanmin(drawn, axis=0), np.nanmax(drawn, axis=0)
         pixels = np.array(self._axes.get_window_extent().size)
         if pixels.min() < 3.0 * self._margin:
             raise SceneError(CROWDED)
