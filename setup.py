@@ -15,7 +15,7 @@ interfaces = Path(__file__).resolve().with_name('linkage_interfaces')
 commands = {
     'c_code': 'c_code.cli:main', 'crank_driver': 'executables:crank_driver',
     'from_robot': 'robot_files.cli:main', 'kinematics': 'executables:kinematics',
-    'render': 'render:main', 'scene': 'executables:scene',
+    'render': 'render.cli:main', 'scene': 'executables:scene',
     'servo_inverse': 'executables:servo_inverse', 'transmission': 'c_code.transmission:main',
     'urdf': 'nodes.urdf_cli:main', 'viewer': 'executables:viewer'}
 # colcon and bloom put commands where `ros2 run` looks for them; pip would put them on everybody's

@@ -27,9 +27,14 @@ def truncated(text: str, limit: int = MAX_QUOTED) -> str:
     return start if len(start) <= limit else start[:limit - 3] + '...'
 
 
+def brief(text: Any) -> str:
+    """Return a text as a whole message: one line of limited length."""
+    return truncated(str(text), MESSAGE)
+
+
 def sentence(text: Any) -> str:
     """Return a text for a terminal: one line of limited length, as is each of its words."""
-    return truncated(' '.join(truncated(word, MESSAGE) for word in str(text).split()), MAX_LINE)
+    return truncated(' '.join(map(brief, str(text).split())), MAX_LINE)
 
 
 class RequestError(Exception):

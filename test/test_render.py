@@ -14,7 +14,8 @@ import subprocess
 from xml.etree import ElementTree
 
 from linkage_ros import mechanisms, palette, scene
-from linkage_ros.render import layers, main
+from linkage_ros.render import layers
+from linkage_ros.render.cli import main, parsed
 from linkage_ros.render.cycle import Cycle
 from linkage_ros.render.parts import DEFAULT, PARTS
 from linkage_ros.render.picture import Picture
@@ -336,7 +337,6 @@ def test_options_have_these_defaults_and_limits(tmp_path):
 
 
 def test_the_help_has_examples_that_can_be_run(capsys):
-    from linkage_ros.render.cli import main, parsed
     with pytest.raises(SystemExit):
         main(['--help'])
     examples = re.findall(r'^  render (config/.*)', capsys.readouterr().out, re.M)

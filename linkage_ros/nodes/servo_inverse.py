@@ -20,7 +20,7 @@ from ..cache import Cache
 from ..optional import needs
 from ..robot_model import bodies
 from ..scene.inverse_request import InverseRequest, LEVER, present_inputs
-from ..words import join_names, MESSAGE, n_inputs, short_repr, suggestion, truncated
+from ..words import brief, join_names, n_inputs, short_repr, suggestion
 
 # Other callers and messages wait for an answer: the maximum number of values in a request.
 MAX_VALUES = 10_000
@@ -93,7 +93,7 @@ class ServoInverse(scene_node.SceneNode):
         try:
             fill()
         except ValueError as problem:
-            response.message = truncated(str(problem), MESSAGE)
+            response.message = brief(problem)
         return response
 
     def _interpret(self, message: JointState) -> list[tuple[str, int]]:
@@ -136,8 +136,8 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
     response.reachable = np.isfinite(np.ravel(positions)).tolist()
     response.success = all(response.reachable)
     if not response.success:
-        response.message = truncated(_unreachable(inverse, [
-            value for value, reached in zip(values, response.reachable) if not reached]), MESSAGE)
+        response.message = brief(_unreachable(inverse, [
+            value for value, reached in zip(values, response.reachable) if not reached]))
 
 
 def solve_inputs_for(mechanism: scene.SceneMechanism, request: Any, response: Any) -> None:
@@ -159,7 +159,7 @@ def solve_inputs_for(mechanism: scene.SceneMechanism, request: Any, response: An
     response.modes = [solution.mode for _, solution in answers]
     response.singular = [solution.is_singular for _, solution in answers]
     response.success = bool(answers)
-    response.message = '' if answers else truncated(inverse.reason(*values), MESSAGE)
+    response.message = '' if answers else brief(inverse.reason(*values))
 
 
 def _chosen(mechanisms: Mapping[str, scene.SceneMechanism], name: str,

@@ -6,7 +6,3 @@ Pictures of scenes: PNG, SVG, GIF and MP4, with Matplotlib and without ROS.
 
     python -m linkage_ros.render config/jansen.yaml --out leg.gif
 """
-
-from .cli import main
-
-__all__ = ['main']

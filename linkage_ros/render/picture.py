@@ -83,12 +83,12 @@ class Picture:
         self.figure.set_layout_engine('none')
         chosen = times[::math.ceil(len(times) / MAX_POSES)]
         for panel in self.panels:
-            panel.settle([self._turns(panel, turns) for turns in chosen])
+            panel.settle([self.seconds(turns) / panel.cycle.period for turns in chosen])
 
     def show(self, turns):
         """Move all panels to a time [turns of the first mechanism's crank]."""
         for panel in self.panels:
-            panel.show(self._turns(panel, turns))
+            panel.show(self.seconds(turns) / panel.cycle.period)
 
     def at(self, turns):
         """Return the picture at a time [turns], shape (height, width, 3), 8 bits per colour."""
@@ -99,10 +99,6 @@ class Picture:
     def seconds(self, turns):
         """Return the duration of turns [s]; 0 if the first mechanism stands still."""
         return turns * self.period if math.isfinite(self.period) else 0.0
-
-    def _turns(self, panel, turns):
-        """Return the turns of one mechanism in the time of some turns of the first."""
-        return self.seconds(turns) / panel.cycle.period
 
 
 class Panel:
@@ -119,21 +115,11 @@ class Panel:
         if 'guides' in parts:
             layers.guides(axes, mechanism, self.cycle, unit)
         self.moving.append(layers.Legs(axes, mechanism, self.cycle, parts, unit))
-        self._names = None
         if 'labels' in parts and len(self.cycle.prefixes) == 1:
-            self._names = layers.Names(axes, mechanism, self.cycle, unit)
-            self.moving.append(self._names)
+            self.moving.append(layers.Names(axes, mechanism, self.cycle, unit))
         if parts & {'title', 'dimensions'}:
             self.moving.append(layers.Headline(axes, mechanism, parts, unit, single))
         self._dress('axes' in parts, unit)
-
-    def _drawn(self):
-        """Return the lowest and the highest x and y drawn in a turn [m]."""
-        course, joints = self.cycle.course, len(self.mechanism.linkage.points)
-        places = [course[:, :, self._joints].reshape(-1, 2), course[:, :, joints:].reshape(-1, 2)]
-        places += [line.get_xydata() for line in self._axes.lines if len(line.get_xdata()) > 2]
-        drawn = np.concatenate(places)
-        return np.nanmin(drawn, axis=0), np.nanmax(drawn, axis=0)
 
     def _dress(self, axes_shown, unit):
         if not axes_shown:
@@ -149,7 +135,11 @@ class Panel:
 
     def fill(self):
         """Set limits around all that is drawn, at one scale; SceneError if too small."""
-        low, high = self._drawn()
+        course, joints = self.cycle.course, len(self.mechanism.linkage.points)
+        places = [course[:, :, self._joints].reshape(-1, 2), course[:, :, joints:].reshape(-1, 2)]
+        places += [line.get_xydata() for line in self._axes.lines if len(line.get_xdata()) > 2]
+        drawn = np.concatenate(places)
+        low, high = np.nanmin(drawn, axis=0), np.nanmax(drawn, axis=0)
         pixels = np.array(self._axes.get_window_extent().size)
         if pixels.min() < 3.0 * self._margin:
             raise SceneError(CROWDED)
@@ -160,8 +150,8 @@ class Panel:
 
     def settle(self, times):
         """Place the joints' names for poses at these times [turns]."""
-        if self._names:
-            self._names.settle(np.stack([self.cycle.pose(turns).places for turns in times]))
+        for names in [layer for layer in self.moving if isinstance(layer, layers.Names)]:
+            names.settle(np.stack([self.cycle.pose(turns).places for turns in times]))
 
     def show(self, turns):
         """Move all layers to a time [turns of the crank]."""

@@ -142,9 +142,9 @@ class _Loops:
         self._ends: dict[str, tuple[float, float]] = {}
         for drive in (drive for made in parts for drive in mechanisms[made.name].inputs.values()):
             around = math.pi if drive.input.is_angle else 0.5 * component.size
-            low, high = drive.ends or (drive.start - around, drive.start + around)
-            ends = sorted((end - drive.offset) / drive.ratio for end in (
-                max(low, drive.start - 2.0 * around), min(high, drive.start + 2.0 * around)))
+            around = 2.0 * around if drive.ends else around
+            ends = sorted((end - drive.offset) / drive.ratio for end in np.clip(
+                drive.ends or (-math.inf, math.inf), drive.start - around, drive.start + around))
             low, high = self._ends.get(drive.source, ends)
             self._ends[drive.source] = max(low, ends[0]), min(high, ends[1])
         self._slack = MISFIT * max(made.slack for made in parts)
@@ -152,8 +152,19 @@ class _Loops:
         self._misfit = component.errors(component.start)[0]
 
     def report(self) -> str:
-        """Return the report; raise Difference as `_walk_to` does, or for another start."""
-        self._check_start()
+        """
+        Return the report.
+
+        Raise Difference as `_walk_to` does, or if a joint is not where the file has it.
+        """
+        component = self._component
+        start = self._positions({name: np.array([value]) for name, value in self._start.items()})
+        seen, drawn = map(component.read, (
+            component.moved_to(component.start, start), component.start))
+        for name in start:
+            off = abs(seen[name] - drawn[name])[0] / component.unit[component.named[name]]
+            if off > OTHER + self._slack:
+                raise Difference(f'{self._at(self._start)} {name} is off by {off:.2g}')
         low, high = corners = np.array([
             self._ends.get(source, (value,) * 2) for source, value in self._start.items()]).T
         walk, beyond = self._walk_to(corners if len(self._ends) == 1 else np.random.default_rng(
@@ -164,18 +175,6 @@ class _Loops:
         names, openings = ', '.join(made.name for made in self._parts), walk.openings[walk.good]
         return (f'Checked: {names}: in {openings.size} poses of the robot, {moved}, its loops '
                 f'stand open by {openings.max():.0e} m at most{beyond}.')
-
-    def _check_start(self) -> None:
-        """Raise Difference if a joint is not where the file has it."""
-        component = self._component
-        start = self._positions({name: np.array([value]) for name, value in self._start.items()})
-        seen, drawn = map(component.read, (
-            component.moved_to(component.start, start), component.start))
-        for name in start:
-            off = float(seen[name][0] - drawn[name][0])
-            off = abs(off) / component.unit[component.named[name]]
-            if off > OTHER + self._slack:
-                raise Difference(f'{self._at(self._start)} {name} is off by {off:.2g}')
 
     def _walk_to(self, targets: np.ndarray) -> tuple[Walk, str]:
         """

@@ -61,25 +61,20 @@ def show(args: list[str] | None) -> None:
         robot = with_positions(robot, positions(arguments.pose))
         robot = closing.held(robot, {**robot.held, **positions(arguments.hold)})
         parameters, reports, still = described(robot)
+    launched = {'robot': arguments.file, 'scene': 'SCENE.yaml', 'loops': arguments.loops or '',
+                'hold': shlex.join([*arguments.hold, *(
+                    f'{name}={short(value)}' for name, value in still.items())])}
     # Unprintable characters in names of the file could end a comment.
     head = [truncated(line, 10 ** 6) for line in (
         f'From {arguments.file}. Its joints on /joint_states, and its model:',
-        _launch(arguments, still), READING)]
+        'ros2 launch linkage_ros robot.launch.py ' + ' '.join(
+            f'{name}:={shlex.quote(text)}' for name, text in launched.items() if text), READING)]
     lines = [*dict.fromkeys(map(sentence, reports))]
     print(*(f'# {line}' for line in head + lines), in_yaml(parameters), sep='\n', end='')
     print(*(f'{NAME}: {line}' for line in lines), sep='\n', file=sys.stderr)
     if wrong := [line for line in reports if WRONG in line]:
         raise cli.RequestError(f'{len(wrong)} mechanisms are left out, as they differ from '
                                'the robot or could not be compared with it')
-
-
-def _launch(parsed: Any, still: Mapping[str, float]) -> str:
-    """Return the command that launches the robot with its scene; some joints stay."""
-    arguments = {'robot': parsed.file, 'scene': 'SCENE.yaml', 'loops': parsed.loops or '',
-                 'hold': shlex.join([*parsed.hold, *(
-                     f'{name}={short(value)}' for name, value in still.items())])}
-    return 'ros2 launch linkage_ros robot.launch.py ' + ' '.join(
-        f'{name}:={shlex.quote(text)}' for name, text in arguments.items() if text)
 
 
 def described(robot: Robot) -> tuple[dict[str, Any], list[str], dict[str, float]]:

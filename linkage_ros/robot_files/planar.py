@@ -13,7 +13,7 @@ from cmath import phase
 from contextlib import suppress
 from dataclasses import replace
 import math
-from typing import NamedTuple, Sequence
+from typing import Iterator, NamedTuple, Sequence
 
 import numpy as np
 
@@ -70,17 +70,13 @@ def _parts(robot: Robot, group: Group) -> list[Group]:
     return parts
 
 
-def _groups(robot: Robot, joints: list[Joint]) -> list[Group]:
-    """Return the loops of some joints, those that share bars together."""
-    tree, cuts = replace(robot, joints=joints).spanning_tree()
-    groups = []
-    for bodies, closures in loops_of(tree, cuts):
-        edges = {tree[body][1] for body in bodies} | {*closures}
+def _groups(robot: Robot, joints: list[Joint]) -> Iterator[Group]:
+    """Yield the loops of some joints, those that share bars together."""
+    tree, loops = loops_of(replace(robot, joints=joints))
+    for bodies, inside, _ in loops:
         # The parent of the first body is nearest to the root.
         ground = next(base for body, (base, _) in tree.items() if body in bodies)
-        inside = [joint for joint in joints if joint in edges]
-        groups.append(Group(ground, inside, _why_not_planar(ground, inside), []))
-    return groups
+        yield Group(ground, inside, _why_not_planar(ground, inside), [])
 
 
 def _with_balls(robot: Robot) -> list[Joint]:
@@ -127,20 +123,10 @@ def _why_not_planar(ground: str, joints: Sequence[Joint]) -> str:
             return (f'not planar: the axes of {hinges[0].name} and {joint.name} are '
                     f'{np.degrees(np.arcsin(min(askew, 1.0))):.3g} degrees from it, more '
                     f'than {np.degrees(ASKEW):.2g}')
-    return _why_loose(ground, joints, hinges[0].axes[0])
-
-
-def _pins(joint: Joint, normal: np.ndarray) -> list[tuple[Joint, float]]:
-    """Return the hinges of a ball that turn in a plane, with their signs."""
-    return [(hinge, sign) for hinge, sign in joint.parts
-            if hinge.kind == HINGE and inclination(hinge, normal) < ASKEW]
-
-
-def _why_loose(ground: str, joints: Sequence[Joint], normal: np.ndarray) -> str:
-    """Return which body can leave the plane, '' if none: only rods may be on balls alone."""
+    # A body that can leave the plane: only rods may be on balls alone.
     stiff = {ground}
     joining = [joint for joint in joints if joint.kind != BALL
-               or len(joint.hinges) == 2 and _pins(joint, normal)]
+               or len(joint.hinges) == 2 and _pins(joint, hinges[0].axes[0])]
     # A universal joint with an axis normal to the plane is a pin, but a body can lean on it that
     # has no other pin.
     pinned = [ground, *(body for joint in joining for body in joint.bodies)]
@@ -154,6 +140,12 @@ def _why_loose(ground: str, joints: Sequence[Joint], normal: np.ndarray) -> str:
         if body not in stiff and (len(ends) != 2 or not all(stiff & {*pair} for pair in ends)):
             return f'not planar: {body} hangs on balls alone, and is no rod'
     return ''
+
+
+def _pins(joint: Joint, normal: np.ndarray) -> list[tuple[Joint, float]]:
+    """Return the hinges of a ball that turn in a plane, with their signs."""
+    return [(hinge, sign) for hinge, sign in joint.parts
+            if hinge.kind == HINGE and inclination(hinge, normal) < ASKEW]
 
 
 class Drawing(Dyads):
@@ -256,8 +248,6 @@ class Drawing(Dyads):
 
         Raises ValueError if there is none, as no word places a second joint on a block or barrel.
         """
-        if not self.parts.keys() >= {*joint.bodies}:
-            raise ValueError(joint.name)
         parent, child = joint.bodies
         if joint.kind == SLIDE:
             block, = (body for body in joint.bodies if self.parts[body].slide is joint)
@@ -421,7 +411,7 @@ def _joints(drawing: Drawing) -> list[tuple[str, float, str, float]]:
     """Return the link, the sign, the name and the position of each joint that links measure."""
     measured = []
     read = {joint.name for joint in drawing.driven} | {drive.source for drive in drawing.drives}
-    for joint in drawing.joints:
+    for joint in [joint for joint in drawing.joints if drawing.parts.keys() >= {*joint.bodies}]:
         with suppress(ValueError):
             if joint.position is not None and joint.name not in read:
                 measured.append((joint, *drawing.measured_by(joint)))

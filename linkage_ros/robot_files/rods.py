@@ -72,11 +72,10 @@ class Rods:
                 separate & {*joint.bodies} and self._bodies.keys() & {*joint.bodies})]:
             raise ValueError('links on hinges and undriven slides can be joined by rods '
                              f'and cylinders, not by {join_names(wrong)}')
-        for body, ends in rods.items():
-            first, second = ends
+        for body, (first, second) in rods.items():
             self._rod(first.name, self._end(first, body), self._end(second, body),
                       first.place(body) - second.place(body))
-            self._universal(body, ends)
+            self._universal(body, (first, second))
         for half in halves:
             self._cylinder(half, [next(joint for joint in held_by[body] if joint is not half)
                                   for body in half.bodies])

@@ -131,20 +131,18 @@ class _Model:
 
     def ends(self, name: str, joint: Element) -> tuple[str, str]:
         """Return the links that a joint joins."""
-        return (self.body(self.named(name, text(joint, 'parent'))),
-                self.body(self.named(name, text(joint, 'child'))))
+        return self.link(name, text(joint, 'parent')), self.link(name, text(joint, 'child'))
 
-    def body(self, name: str) -> str:
-        """Return the link that a frame is on."""
-        if name == 'world' or self._parts[name].tag == 'link':
+    def link(self, where: str, name: str, is_model: bool = False) -> str:
+        """Return the link that a frame is on, by the frame's name in a part."""
+        name = self.named(where, name, is_model)
+        part = self._parts.get(name)
+        if part is None or part.tag == 'link':
             return name
-        part = self._parts[name]
         if part.tag == 'model':
             first = next((inner for tag in ('link', 'model') for inner in part.findall(tag)), part)
-            return self.body(self.named(
-                name, part.get('canonical_link', first.get('name', '')), True))
-        return self.body(self.named(name, part.get('attached_to') or text(
-            part, 'child', '__model__')))
+            return self.link(name, part.get('canonical_link', first.get('name', '')), True)
+        return self.link(name, part.get('attached_to') or text(part, 'child', '__model__'))
 
     def frame(self, name: str) -> np.ndarray:
         """Return the pose of a part."""

@@ -20,6 +20,8 @@ from ..cli import RequestError
 from ..linkage import wrapped
 from ..robot_model.robot import BALL, exponentials, FIXED, FREE, HINGE, Joint, Robot, screws, SLIDE
 
+# Each body's parent and joint.
+Tree = dict[str, tuple[str, Joint]]
 # The largest step of an iteration [rad, or of the size].
 MAX_STEP = 0.5
 # The last step [rad, or of the size]: steps square, so that the next would be rounding.
@@ -57,9 +59,9 @@ class Screw(NamedTuple):
     body: str
 
 
-def loops_of(tree: Mapping[str, tuple[str, Joint]], cuts: Sequence[Joint]
-           ) -> list[tuple[set[str], list[Joint]]]:
-    """Return bodies and cuts of the loops of a tree; loops that share joints are together."""
+def loops_of(robot: Robot) -> tuple[Tree, list[tuple[set[str], list[Joint], list[Joint]]]]:
+    """Return a tree, and bodies, joints and cuts of its loops; those that share joints are one."""
+    tree, cuts = robot.spanning_tree()
     groups: list[tuple[set[str], list[Joint]]] = []
     for cut in cuts:
         cycle: set[str] = set()
@@ -71,17 +73,19 @@ def loops_of(tree: Mapping[str, tuple[str, Joint]], cuts: Sequence[Joint]
         groups = [group for group in groups if group not in shared]
         groups.append((cycle.union(*(bodies for bodies, _ in shared)),
                        [joint for _, joints in shared for joint in joints] + [cut]))
-    return groups
+    return tree, [(bodies, [joint for joint in robot.joints if joint in edges], closures)
+                  for bodies, closures in groups
+                  for edges in [{tree[body][1] for body in bodies}.union(closures)]]
 
 
 def components(robot: Robot) -> Iterator['Component']:
     """Yield the loops of a robot; those that share joints are one component."""
-    tree, cuts = robot.spanning_tree()
-    for bodies, joints in loops_of(tree, cuts):
+    tree, loops = loops_of(robot)
+    for bodies, joints, cuts in loops:
         if len(bodies) > MAX_BODIES:
             raise RequestError(f'{len(bodies)} bodies are in loops that share joints: no more '
                                f'than {MAX_BODIES} are closed at once')
-        yield Component(robot, tree, bodies, joints)
+        yield Component(robot.root, tree, bodies, joints, cuts)
 
 
 class Component:
@@ -105,17 +109,16 @@ class Component:
 
     """
 
-    def __init__(self, robot: Robot, tree: dict[str, tuple[str, Joint]], bodies: set[str],
+    def __init__(self, root: str, tree: Tree, bodies: set[str], joints: Sequence[Joint],
                  cuts: Sequence[Joint]):
-        edges = {tree[body][1] for body in bodies} | {*cuts}
-        self.joints = [joint for joint in robot.joints if joint in edges]
+        self.joints = joints
         places = np.array([place for joint in self.joints for place in joint.places])
         self.size = float(np.max(np.linalg.norm(places - places[0], axis=1))) or 1.0
         self._up = next((joint.axes[0] for joint in self.joints if joint.kind == HINGE),
                         np.zeros(3))
         self._screws: list[Screw] = []
         # The last screw that moves each body.
-        last = {robot.root: -1}
+        last = {root: -1}
         for body, (base, joint) in tree.items():
             last[body] = last[base]
             if body in bodies:

@@ -6,7 +6,6 @@
 from typing import Sequence
 
 from . import bodies, mjcf, sdf, urdf
-from .bodies import DENSITY
 from .. import cli, scene
 from ..linkage import MAX_LENGTH, MIN_LENGTH
 
@@ -35,14 +34,14 @@ def show(args: Sequence[str] | None, given_scene: scene.Scene | None = None) -> 
                              '40th of the longest)')
     parser.add_argument('--density', type=positive, metavar='KG/M3',
                         help='density of all bodies of sdf and mjcf '
-                             f'(default: {DENSITY:g}, aluminium)')
+                             f'(default: {bodies.DENSITY:g}, aluminium)')
     options = parser.parse_args(args)
     if given_scene and options.scene is not None:
         raise cli.RequestError('give the scene either as SCENE or with --ros-args, not both')
     shown = given_scene or (scene.read({}) if options.scene is None else scene.load(options.scene))
     if options.format == 'urdf' and options.density:
         raise cli.RequestError('--density is for sdf and mjcf only: the URDF has no masses')
-    density = 0.0 if options.format == 'urdf' else options.density or DENSITY
+    density = 0.0 if options.format == 'urdf' else options.density or bodies.DENSITY
     model = bodies.robot(cli.chosen(shown.mechanisms, options.mechanism), shown.frame_id,
                          options.width, density)
     print({'urdf': urdf, 'sdf': sdf, 'mjcf': mjcf}[options.format].write(model))

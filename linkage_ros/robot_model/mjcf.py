@@ -16,7 +16,7 @@ import math
 from xml.etree.ElementTree import Element, indent, tostring
 
 from .bodies import add, COLOURS
-from .robot import Body, HINGE, Joint, Robot
+from .robot import Body, HINGE, Robot
 from .shapes import BALL, BOX, CYLINDER
 
 # Time step [s] for a linkage of a metre; smaller linkages oscillate faster.
@@ -37,7 +37,7 @@ def write(robot: Robot) -> str:
     add(usual, 'geom', contype='0', conaffinity='0', density=robot.density)
     add(usual, 'equality', solref=(2.0 * step, 1.0), solimp='0.9999 0.9999 1')
     elements = {robot.root: add(root, 'worldbody')}
-    equality, actuator = add(root, 'equality'), add(root, 'actuator')
+    equality, servos = add(root, 'equality'), add(root, 'actuator')
     bodies = {body.name: body for body in robot.bodies()}
     for body in bodies.values():
         elements[body.name] = _add_body(elements[body.parent], body, robot)
@@ -49,7 +49,12 @@ def write(robot: Robot) -> str:
         add(equality, 'joint', joint1=name, joint2=other, polycoef=(offset, ratio, 0, 0, 0))
     motors = [joint for name in robot.driven for joint in robot.joints if joint.name == name]
     for joint in motors:
-        _add_motor(actuator, joint, robot)
+        # A servo is stiff against weight, but too weak to break a loop.
+        mass, arm = robot.servos[joint.name]
+        turns = joint.kind == HINGE
+        force, path = mass * GRAVITY * (arm if turns else 1.0), YIELD * (1.0 if turns else arm)
+        add(servos, 'position', name=joint.name, joint=joint.name, dampratio='1', kp=force / path,
+            forcerange=(-STRENGTH * force, STRENGTH * force), ctrlrange=joint.limits)
     add(add(root, 'keyframe'), 'key', name='start', ctrl=[joint.start for joint in motors])
     indent(root)
     return tostring(root, encoding='unicode')
@@ -67,12 +72,3 @@ def _add_body(parent: Element, body: Body, robot: Robot) -> Element:
         add(made, 'geom', type=piece.shape, pos=piece.pose[:3], euler=piece.pose[3:], size=sizes,
             rgba=COLOURS[piece.colour])
     return made
-
-
-def _add_motor(actuator: Element, joint: Joint, robot: Robot) -> None:
-    """Add a servo that is stiff against weight, but too weak to break a loop."""
-    mass, arm = robot.servos[joint.name]
-    turns = joint.kind == HINGE
-    force, path = mass * GRAVITY * (arm if turns else 1.0), YIELD * (1.0 if turns else arm)
-    add(actuator, 'position', name=joint.name, joint=joint.name, dampratio='1', kp=force / path,
-        forcerange=(-STRENGTH * force, STRENGTH * force), ctrlrange=joint.limits)

@@ -57,8 +57,6 @@ def shapes(mechanism: SceneMechanism) -> list[Shape]:
     """Return the sliding parts, guides first; parts that no pose was found for are omitted."""
     linkage = mechanism.linkage
     slides = [link for link in linkage.links if link.kind == 'prismatic']
-    if not slides:
-        return []
     frames = {GROUND: ground_frame(linkage), **linkage.frames}
     lengths = linkage.joint_angles(input_values(mechanism), [link.name for link in slides])
     guides, others = [], []

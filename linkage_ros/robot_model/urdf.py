@@ -19,8 +19,7 @@ import numpy as np
 
 from . import bodies
 from .bodies import add, COLOURS
-from .robot import Body, HINGE, Robot, with_positions
-from .shapes import Piece
+from .robot import HINGE, Robot, with_positions
 from ..scene import SceneMechanism
 
 # The end of a joint that has none [rad or m].
@@ -40,28 +39,23 @@ def write(robot: Robot) -> str:
         add(add(root, 'material', name=colour), 'color', rgba=rgba)
     add(root, 'link', name=robot.root)
     for body in robot.bodies():
-        _add_link(root, body, robot.pieces.get(body.name, ()))
+        joint = add(root, 'joint', name=f'{body.name}_fixed', type='fixed')
+        add(joint, 'parent', link=body.parent)
+        add(joint, 'child', link=body.name)
+        add(joint, 'origin', xyz=body.pose[:3], rpy=body.pose[3:])
+        if moving := body.joint:
+            turns, limits = moving.kind == HINGE, moving.limits
+            joint.set('name', moving.name)
+            joint.set('type', 'prismatic' if not turns else 'revolute' if limits else 'continuous')
+            add(joint, 'axis', xyz=body.axis)
+            if limits or not turns:
+                lower, upper = np.nan_to_num(moving.range, posinf=FAR, neginf=-FAR)
+                add(joint, 'limit', lower=lower, upper=upper, effort='0', velocity='0')
+        link = add(root, 'link', name=body.name)
+        for piece in robot.pieces.get(body.name, ()):
+            visual = add(link, 'visual')
+            add(visual, 'origin', xyz=piece.pose[:3], rpy=piece.pose[3:])
+            add(add(visual, 'geometry'), piece.shape, **piece.sizes)
+            add(visual, 'material', name=piece.colour)
     indent(root)
     return tostring(root, encoding='unicode')
-
-
-def _add_link(root: Element, body: Body, pieces: Iterable[Piece]) -> None:
-    """Add a link, what is seen of it, and the joint that it hangs on."""
-    joint = add(root, 'joint', name=f'{body.name}_fixed', type='fixed')
-    add(joint, 'parent', link=body.parent)
-    add(joint, 'child', link=body.name)
-    add(joint, 'origin', xyz=body.pose[:3], rpy=body.pose[3:])
-    if moving := body.joint:
-        turns, limits = moving.kind == HINGE, moving.limits
-        joint.set('name', moving.name)
-        joint.set('type', 'prismatic' if not turns else 'revolute' if limits else 'continuous')
-        add(joint, 'axis', xyz=body.axis)
-        if limits or not turns:
-            lower, upper = np.nan_to_num(moving.range, posinf=FAR, neginf=-FAR)
-            add(joint, 'limit', lower=lower, upper=upper, effort='0', velocity='0')
-    link = add(root, 'link', name=body.name)
-    for piece in pieces:
-        visual = add(link, 'visual')
-        add(visual, 'origin', xyz=piece.pose[:3], rpy=piece.pose[3:])
-        add(add(visual, 'geometry'), piece.shape, **piece.sizes)
-        add(visual, 'material', name=piece.colour)

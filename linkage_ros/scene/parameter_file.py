@@ -10,7 +10,6 @@ rcl_yaml_param_parser (https://github.com/ros2/rcl). What it reads in a surprisi
 
 from __future__ import annotations
 
-from functools import reduce
 import re
 from typing import Any, Iterator, Sequence
 
@@ -145,7 +144,7 @@ def _line(node: Any) -> str:
 
 def _checked(names: Sequence[str]) -> str:
     """Return the name of a section; raise ValueError if nodes cannot have it."""
-    name = reduce(lambda space, part: f'{space.removesuffix("/")}/{part}', names) if names else ''
+    name = '/'.join([*(space.removesuffix('/') for space in names[:-1]), *names[-1:]])
     if not all(map(_TOKEN.fullmatch, name.removeprefix('/').split('/'))):
         raise ValueError(f'{KEY} must be below the name of a node, such as /**, not '
                          f'{short_repr(name)}')

@@ -15,15 +15,7 @@ from typing import Any, Callable, Collection, Iterable, Mapping, NamedTuple, Seq
 import numpy as np
 
 from ..cache import cached
-from ..words import (
-    did_you_mean,
-    join_names,
-    MESSAGE,
-    plain_text,
-    short_repr,
-    suggestion,
-    truncated,
-)
+from ..words import brief, did_you_mean, join_names, plain_text, short_repr, suggestion, truncated
 
 # The nodes that use parameters; KINEMATICS owns each that it uses.
 DRIVER, INVERSE, KINEMATICS = ALL = 'crank_driver', 'servo_inverse', 'kinematics'
@@ -52,7 +44,7 @@ class SceneError(ValueError):
     """A parameter is invalid; the text names it and says what is allowed."""
 
     def __init__(self, text: str):
-        super().__init__(truncated(text, MESSAGE))
+        super().__init__(brief(text))
 
 
 @dataclass(frozen=True)

@@ -151,7 +151,6 @@ class SceneMechanism:
         units, scales = list(map(self.scale_of, outputs)), self.scales
         inverse = self.linkage.inverse(tuple(outputs))
         targets, seeds = divided(values, units), divided(seed, scales)
-        inputs: Sequence[float]
         inputs, rates = inverse.follow(targets, seeds, self.ends)
         if jumps and not math.isfinite(inputs[0]):
             inputs, rates = inverse.nearest(targets, seeds, self.ends)

@@ -332,8 +332,7 @@ class SceneView:
             **dict.fromkeys((topic for topic, _ in graph.values()), self._listen),
             **dict.fromkeys((f'{node}/{SETTER}' for node in graph),
                             partial(self._node.create_client, SetParametersAtomically))}
-        present = dict.fromkeys(self._entities, self._listen)
-        self._keep({**present, **entities})
+        self._keep({**dict.fromkeys(self._entities, self._listen), **entities})
         await self._until(lambda: self._announced.keys() >= graph.keys(), MAX_ANNOUNCE_S)
         self._scenes, self._mechanisms = {}, {}
         for owner, (_, sources) in sorted(graph.items()):

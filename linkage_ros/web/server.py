@@ -22,7 +22,7 @@ from aiohttp import web, WSCloseCode, WSMsgType
 from .feed import Feed
 from .scene_view import JsonObject, SceneView
 from .. import palette
-from ..words import MESSAGE, short_repr, truncated
+from ..words import brief, short_repr, truncated
 
 PAGE = Path(__file__).parent / 'page'
 # Files with placeholders for the palette's colours, which are their names in lower case.
@@ -135,14 +135,11 @@ class Server:
     def _is_own(self, host: str) -> bool:
         # Without port, and without the brackets of a numeric address.
         name = re.sub(r'^\[|\]?(:\d*)?$', '', host.lower())
-        if name in ('localhost', self._host.lower(), socket.gethostname().lower()):
-            return True
-        try:
-            address = ipaddress.ip_address(name)
-        except ValueError:
-            return False
-        # A numeric address cannot be directed to another machine.
-        return address.is_loopback or self._host in ('0.0.0.0', '::')
+        is_own = name in ('localhost', self._host.lower(), socket.gethostname().lower())
+        with suppress(ValueError):
+            # A numeric address cannot be directed to another machine.
+            is_own |= ipaddress.ip_address(name).is_loopback or self._host in ('0.0.0.0', '::')
+        return is_own
 
     async def _connect(self, request: web.Request) -> Any:
         socket_ = web.WebSocketResponse(
@@ -243,7 +240,7 @@ class Client:
                     raise ValueError(f'unknown request {short_repr(op)}')
                 answer = await getattr(self._view, op)(**request)
             except ValueError as reason:
-                answer = {'reason': truncated(str(reason), MESSAGE)}
+                answer = {'reason': brief(reason)}
             except Exception as error:
                 # Without an answer the browser would wait forever.
                 answer = {'reason': f'the request fails: {truncated(repr(error), 200)}'}
