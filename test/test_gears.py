@@ -55,7 +55,7 @@ def test_a_pose_is_answered_in_the_turn_in_which_it_is(ratio):
             value, rate = (float(call(theta, (output,))[output])
                            for call in (linkage.joint_angles, linkage.joint_rates))
             close = 1e-9 + 8.0 * size * math.ulp(theta) / min(1.0, abs(rate))
-            assert linkage.input_for(output, value, near=theta - 0.01) == pytest.approx(
+            assert linkage.input_for(output, value, near=theta - 0.01 / size) == pytest.approx(
                 theta, abs=close), output
             assert linkage.follow(output, value, theta)[0] == pytest.approx(theta, abs=close)
             (many,), _ = linkage.inverse(output).nearest(([value] * 2,), ([theta, theta],))

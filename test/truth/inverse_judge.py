@@ -256,6 +256,6 @@ def _differ(inverse, gaps, scales):
     """Return whether outputs differ, those that are inputs not only by whole periods."""
     inputs = {input_.name: input_ for input_ in inverse.inputs}
     return not all(
-        (inputs[name].apart(gap, 0.0) if name in inputs else
+        (inputs[name].distance(gap, 0.0) if name in inputs else
          abs(math.remainder(gap, math.tau)) if inverse.linkage.is_angle(name) else abs(gap))
         < 1e-7 * scale for name, gap, scale in zip(inverse.outputs, gaps, scales))
