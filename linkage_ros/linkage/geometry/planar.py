@@ -263,7 +263,9 @@ class CrankArm(Arm):
         g, m, s, h = self._g, self._m, self._s, self._h
         gm = 4.0 * g * m
         start = sign * (exact_sum(radius, -g, -m) * exact_sum(radius, g, m))
-        end = sign * where(self._is_isosceles, square(radius),
+        same = exact_sum(radius)
+        same = where(abs(same) <= 0.25 * TOLERANCE * size, 0.0, same)
+        end = sign * where(self._is_isosceles, square(same),
                            exact_sum(radius, -g, m) * exact_sum(radius, g, -m))
         # The margin can vanish only next to its smaller value at an end.
         margin = where(abs(start) <= abs(end), start + sign * gm * square(s),
