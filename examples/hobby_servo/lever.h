@@ -365,19 +365,19 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
     int is_rounding = 0;
     int i, is_last;
     for (is_last = 0; is_last <= 1; is_last++) {
-        const lkr_real left =
+        const lkr_real error =
             model->at(has_rates, p) ? lkr_residual(model, side, position, p, step) : INFINITY;
-        if (left <= LKR_CONVERGED
-            || left <= LKR_CONVERGED * lkr_condition(model, side, position, p, 0)) {
+        if (error <= LKR_CONVERGED
+            || error <= LKR_CONVERGED * lkr_condition(model, side, position, p, 0)) {
             return 1;
         }
-        if (!(left < least)) {
+        if (!(error < least)) {
             break;
         }
-        least = left;
+        least = error;
         has_rates = has_rates || model->at(1, p);
         best = *p;
-        is_rounding = left <= LKR_TOLERANCE * lkr_condition(model, side, position, p, 1);
+        is_rounding = error <= LKR_TOLERANCE * lkr_condition(model, side, position, p, 1);
         if (is_last || !lkr_solve(model, side, p, 0, step)) {
             break;
         }

@@ -53,28 +53,39 @@ def show(args: list[str] | None) -> None:
     with np.errstate(all='ignore'):
         robot = readers.read(arguments.file, arguments.loops)
         robot.check_names(arguments.driven or ())
-        motors, robot.driven = robot.driven, arguments.driven or robot.driven
-        for component in components(robot):
-            # Loops of which no motor is named keep those of the file.
-            if not {robot.source(name)[0] for name in component.named}.intersection(robot.driven):
-                robot.driven += [name for name in motors if name in component.named]
+        if arguments.driven:
+            robot.driven = _motors(robot, arguments.driven)
         robot = with_positions(robot, positions(arguments.pose))
         robot = closing.held(robot, {**robot.held, **positions(arguments.hold)})
         parameters, reports, still = described(robot)
-    launched = {'robot': arguments.file, 'scene': 'SCENE.yaml', 'loops': arguments.loops or '',
-                'hold': shlex.join([*arguments.hold, *(
-                    f'{name}={short(value)}' for name, value in still.items())])}
     # Unprintable characters in names of the file could end a comment.
     head = [truncated(line, 10 ** 6) for line in (
         f'From {arguments.file}. Its joints on /joint_states, and its model:',
-        'ros2 launch linkage_ros robot.launch.py ' + ' '.join(
-            f'{name}:={shlex.quote(text)}' for name, text in launched.items() if text), READING)]
+        _launch(arguments, still), READING)]
     lines = [*dict.fromkeys(map(sentence, reports))]
     print(*(f'# {line}' for line in head + lines), in_yaml(parameters), sep='\n', end='')
     print(*(f'{NAME}: {line}' for line in lines), sep='\n', file=sys.stderr)
     if wrong := [line for line in reports if WRONG in line]:
         raise cli.RequestError(f'{len(wrong)} mechanisms are left out, as they differ from '
                                'the robot or could not be compared with it')
+
+
+def _motors(robot: Robot, chosen: Sequence[str]) -> list[str]:
+    """Return the joints that motors move: those chosen, and the file's in loops without any."""
+    driven = [*chosen]
+    for component in components(robot):
+        if not {robot.source(name)[0] for name in component.named}.intersection(driven):
+            driven += [name for name in robot.driven if name in component.named]
+    return driven
+
+
+def _launch(parsed: Any, still: Mapping[str, float]) -> str:
+    """Return the command that launches the robot with its scene; some joints stay."""
+    arguments = {'robot': parsed.file, 'scene': 'SCENE.yaml', 'loops': parsed.loops or '',
+                 'hold': shlex.join([*parsed.hold, *(
+                     f'{name}={short(value)}' for name, value in still.items())])}
+    return 'ros2 launch linkage_ros robot.launch.py ' + ' '.join(
+        f'{name}:={shlex.quote(text)}' for name, text in arguments.items() if text)
 
 
 def described(robot: Robot) -> tuple[dict[str, Any], list[str], dict[str, float]]:

@@ -263,9 +263,10 @@ class CrankArm(Arm):
         g, m, s, h = self._g, self._m, self._s, self._h
         gm = 4.0 * g * m
         start = sign * (exact_sum(radius, -g, -m) * exact_sum(radius, g, m))
-        same = exact_sum(radius)
-        same = where(abs(same) <= 0.25 * TOLERANCE * size, 0.0, same)
-        end = sign * where(self._is_isosceles, square(same),
+        # Where ground and crank are equal up to rounding, bars are that differ by rounding alone.
+        exact = exact_sum(radius)
+        exact = where(abs(exact) <= 0.25 * TOLERANCE * size, 0.0, exact)
+        end = sign * where(self._is_isosceles, square(exact),
                            exact_sum(radius, -g, m) * exact_sum(radius, g, -m))
         # The margin can vanish only next to its smaller value at an end.
         margin = where(abs(start) <= abs(end), start + sign * gm * square(s),
@@ -282,6 +283,7 @@ class CrankArm(Arm):
         ahead, behind = (-sign, 1.0) if self._crank.backwards else (1.0, sign)
         beyond = where(0.0 <= self._turn.y, behind, -behind)
         return where(-TOLERANCE <= self._turn.x, ahead, beyond)
+
 
 def _half_angle(theta: Real, turn: Complex) -> tuple[Real, Real]:
     """Return sine and cosine of (theta + arg turn) / 2 for a unit vector turn."""
